@@ -1,0 +1,52 @@
+"""Checks of single numbers, with one form of message: key, legal range, unit, what came."""
+
+from __future__ import annotations
+
+import math
+import sys
+from typing import Any
+
+import numpy as np
+
+from fivebar_sim.errors import ArgumentError, FiveBarError
+
+LARGEST = sys.float_info.max
+
+
+def is_finite(value: Any) -> bool:
+    """Return whether value is a real number that a float can hold; a bool is none."""
+    if not isinstance(value, (int, float, np.number)) or isinstance(value, bool):
+        return False
+    return bool(-LARGEST <= value <= LARGEST)
+
+
+def check_number(
+    key: str,
+    value: Any,
+    unit: str,
+    *,
+    low: float = -math.inf,
+    high: float = math.inf,
+    strict: bool = False,
+    error: type[FiveBarError] = ArgumentError,
+) -> None:
+    """Raise unless value is a finite number in [low, high], or in (low, high) if strict.
+
+    Args:
+        key: What the number is called; the message starts with it.
+        value: What came.
+        unit: Of the range in the message; "" for a pure number.
+        low: Least legal value.
+        high: Greatest legal value.
+        strict: Whether the ends are excluded.
+        error: What to raise.
+
+    Raises:
+        ArgumentError: Or the class given as `error`.
+    """
+    if is_finite(value) and (low < value < high if strict else low <= value <= high):
+        return
+    left = "(" if strict or math.isinf(low) else "["
+    right = ")" if strict or math.isinf(high) else "]"
+    legal = f"{left}{low:g}, {high:g}{right} {unit}".rstrip()
+    raise error(f"{key} must be in {legal}, got {value!r}")

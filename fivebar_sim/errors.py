@@ -1,0 +1,91 @@
+"""The errors that bad input raises: one line each, with the facts as attributes.
+
+Every class refines a builtin, so that callers may catch either.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from difflib import get_close_matches
+
+
+class FiveBarError(Exception):
+    """Base of every error that fivebar-sim raises on purpose."""
+
+
+class ArgumentError(FiveBarError, ValueError):
+    """An argument of the wrong shape, type or name."""
+
+
+class GeometryError(FiveBarError, ValueError):
+    """A leg that cannot exist: a length, mass or mode outside its legal range."""
+
+
+class UnreachableError(FiveBarError, ValueError):
+    """A foot target that no pose reaches.
+
+    Attributes:
+        index: Index of the first unreachable target in the batch; () for a single point.
+    """
+
+    def __init__(self, message: str, index: tuple[int, ...] = ()) -> None:
+        super().__init__(message)
+        self.index = index
+
+
+class LoopOpenError(FiveBarError, ValueError):
+    """Motor angles at which the links do not meet at C.
+
+    Attributes:
+        index: Index of the first open pose in the batch; () for a single pose.
+    """
+
+    def __init__(self, message: str, index: tuple[int, ...] = ()) -> None:
+        super().__init__(message)
+        self.index = index
+
+
+class SingularError(FiveBarError, ValueError):
+    """A pose at which the asked rate or Jacobian is infinite.
+
+    Attributes:
+        index: Index of the first singular pose in the batch; () for a single pose.
+    """
+
+    def __init__(self, message: str, index: tuple[int, ...] = ()) -> None:
+        super().__init__(message)
+        self.index = index
+
+
+class ConfigError(FiveBarError, ValueError):
+    """A scenario, leg or path file that says something illegal; the message names file and key."""
+
+
+class DivergedError(FiveBarError, RuntimeError):
+    """A simulation that broke down.
+
+    Attributes:
+        time: Simulated time of the first bad step [s].
+    """
+
+    def __init__(self, message: str, time: float) -> None:
+        super().__init__(message)
+        self.time = time
+
+
+class RunDirectoryError(FiveBarError, OSError):
+    """A run directory that cannot be written, replaced or read."""
+
+
+def unknown(what: str, name: str, known: Iterable[str]) -> str:
+    """Return the message for a name that is not among the known ones, with a guess.
+
+    Args:
+        what: The kind of thing, in the singular ("preset").
+        name: The name that came.
+        known: The legal names.
+    """
+    legal = sorted(known)
+    close = get_close_matches(name, legal, n=1)
+    hint = f" (did you mean {close[0]!r}?)" if close else ""
+    return f"unknown {what} {name!r}; known: {', '.join(legal)}{hint}"

@@ -1,0 +1,26 @@
+"""Where the shipped files are: beside the package in a checkout, inside it in a wheel."""
+
+from __future__ import annotations
+
+from functools import cache
+from pathlib import Path
+
+PACKAGE = Path(__file__).resolve().parent
+
+
+@cache
+def folder(name: str) -> Path:
+    """Return the shipped folder called name ("models" or "scenarios").
+
+    Raises:
+        FileNotFoundError: If the installation lacks it.
+    """
+    for base in (PACKAGE, PACKAGE.parent):
+        if (base / name).is_dir():
+            return base / name
+    raise FileNotFoundError(f"fivebar-sim is installed without its folder {name!r}")
+
+
+def shipped(name: str, suffix: str = ".toml") -> dict[str, Path]:
+    """Return the files of a shipped folder by stem, sorted."""
+    return {path.stem: path for path in sorted(folder(name).glob(f"*{suffix}"))}

@@ -1,0 +1,103 @@
+"""The house: short files and functions, rooms that import nothing heavy, exports that exist."""
+
+from __future__ import annotations
+
+import ast
+import importlib
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+FILES = sorted(
+    path
+    for folder, pattern in (
+        ("fivebar_sim", "**/*.py"),
+        ("controllers", "**/*.py"),
+        ("scripts", "*.py"),
+        ("tests", "**/*.py"),
+    )
+    for path in (ROOT / folder).glob(pattern)
+)
+PURE = ("geometry", "kinematics", "workspace", "paths")
+HEAVY = {"mujoco", "rerun", "matplotlib", "scipy"}
+
+
+def name(path: Path) -> str:
+    return path.relative_to(ROOT).as_posix()
+
+
+def long_functions(source: str) -> list[str]:
+    """Return "name: lines" of the functions of more than 50 lines, signature to last line."""
+    return [
+        f"{node.name}: {node.end_lineno - node.lineno + 1}"
+        for node in ast.walk(ast.parse(source))
+        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef)
+        and node.end_lineno is not None
+        and node.end_lineno - node.lineno >= 50
+    ]
+
+
+def imports(source: str) -> Iterator[str]:
+    """Yield the top-level names of all modules that a source imports, anywhere in it."""
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.Import):
+            yield from (alias.name.split(".")[0] for alias in node.names)
+        elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
+            yield node.module.split(".")[0]
+
+
+def exporting() -> list[str]:
+    """Return the modules of the package and of controllers that have an __all__."""
+    modules = []
+    for path in FILES:
+        parts = path.relative_to(ROOT).with_suffix("").parts
+        if parts[0] in ("fivebar_sim", "controllers") and "\n__all__ = " in path.read_text("utf-8"):
+            modules.append(".".join(parts).removesuffix(".__init__"))
+    return modules
+
+
+@pytest.mark.parametrize("path", FILES, ids=name)
+def test_files_and_functions_are_short(path: Path) -> None:
+    source = path.read_text(encoding="utf-8")
+    assert source.count("\n") <= 300
+    assert long_functions(source) == []
+
+
+def test_what_is_long_is_seen() -> None:
+    body = "\n".join("    pass" for _ in range(49))
+    assert long_functions(f"def f():\n{body}\n") == []
+    assert long_functions(f"class A:\n  async def f():\n{body}\n    pass\n") == ["f: 51"]
+    assert {"fivebar_sim", "scripts", "tests"} <= {name(path).split("/")[0] for path in FILES}
+
+
+@pytest.mark.parametrize("room", PURE)
+def test_pure_rooms_import_nothing_heavy(room: str) -> None:
+    code = f"import sys, fivebar_sim.{room}; print(*{{m.split('.')[0] for m in sys.modules}})"
+    command = [sys.executable, "-W", "error", "-c", code]
+    run = subprocess.run(command, capture_output=True, text=True, check=True, cwd=ROOT)
+    loaded = set(run.stdout.split())
+    assert "fivebar_sim" in loaded
+    assert not HEAVY & loaded
+
+
+def test_package_never_imports_controllers() -> None:
+    assert list(imports("def f():\n    from controllers.x import y, z\n")) == ["controllers"]
+    for path in (ROOT / "fivebar_sim").rglob("*.py"):
+        assert "controllers" not in set(imports(path.read_text(encoding="utf-8"))), name(path)
+
+
+def test_scripts_and_tests_are_not_imported_by_what_ships() -> None:
+    for path in FILES:
+        if path.parent.name not in ("scripts", "tests"):
+            found = set(imports(path.read_text(encoding="utf-8")))
+            assert not found & {"scripts", "tests"}, name(path)
+
+
+@pytest.mark.parametrize("module", exporting())
+def test_every_export_exists(module: str) -> None:
+    loaded = importlib.import_module(module)
+    assert [each for each in loaded.__all__ if not hasattr(loaded, each)] == []
