@@ -1,0 +1,284 @@
+r"""The five-bar leg as numbers: link lengths, modes, masses; and the presets that ship.
+
+A ---- L5 ---- E      A, E driven; theta_A, theta_E anticlockwise from +x of the hip frame to +z
+ \            /       B, D passive knees; C closes the loop
+  L1        L4        L6: rigid extension of L2 beyond C, ending in the foot F (L6 = 0: F = C)
+   B        D         the origin O of the hip frame is midway between A and E, x forward, z up
+    L2    L3
+      \  /
+       C
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from fivebar_sim import resources, tables
+from fivebar_sim.checks import check_number
+from fivebar_sim.errors import ConfigError, GeometryError, unknown
+
+Mode = tuple[int, int]
+Four = tuple[float, float, float, float]
+
+MODES: tuple[Mode, ...] = ((-1, -1), (-1, 1), (1, -1), (1, 1))
+"""The working modes (s_A, s_E), in the order of `kinematics.inverse_all`."""
+
+
+class Link(NamedTuple):
+    """The inertia of one rigid link, in its own frame.
+
+    Attributes:
+        mass: [kg].
+        com: Centre of mass (along, across) [m] from the inner joint; along points to the outer
+            joint, across is along turned by +90 deg (towards growing theta).
+        inertia: About the centre of mass, about the axis normal to the leg plane [kg m^2].
+    """
+
+    mass: float
+    com: tuple[float, float]
+    inertia: float
+
+
+def capsule(length: float, radius: float, density: float) -> Link:
+    """Return the inertia of a capsule whose caps are centred on the link's two joints.
+
+    Cylinder m_c = rho pi r^2 L and two half balls, together m_s = rho 4/3 pi r^3:
+
+        I = m_c (L^2 / 12 + r^2 / 4) + m_s (2 r^2 / 5 + L^2 / 4 + 3 L r / 8)
+    """
+    L, r = length, radius
+    m_c = density * math.pi * r**2 * L
+    m_s = density * 4.0 / 3.0 * math.pi * r**3
+    inertia = m_c * (L**2 / 12 + r**2 / 4) + m_s * (2 * r**2 / 5 + L**2 / 4 + 3 * L * r / 8)
+    return Link(m_c + m_s, (L / 2, 0.0), inertia)
+
+
+def ball(radius: float, density: float) -> Link:
+    """Return the inertia of a ball about its centre: m = rho 4/3 pi r^3, I = 2/5 m r^2."""
+    mass = density * 4.0 / 3.0 * math.pi * radius**3
+    return Link(mass, (0.0, 0.0), 0.4 * mass * radius**2)
+
+
+def moved(body: Link, at: tuple[float, float], angle: float = 0.0) -> Link:
+    """Return a body turned by angle [rad] about its frame's origin, then shifted by `at` [m]."""
+    (x, y), c, s = body.com, math.cos(angle), math.sin(angle)
+    return Link(body.mass, (at[0] + c * x - s * y, at[1] + s * x + c * y), body.inertia)
+
+
+def combined(*bodies: Link) -> Link:
+    """Return several bodies of one frame as one, by the parallel axis theorem."""
+    mass = sum(b.mass for b in bodies)
+    if mass == 0.0:
+        return bodies[0]
+    x = sum(b.mass * b.com[0] for b in bodies) / mass
+    y = sum(b.mass * b.com[1] for b in bodies) / mass
+    inertia = sum(b.inertia + b.mass * ((b.com[0] - x) ** 2 + (b.com[1] - y) ** 2) for b in bodies)
+    return Link(mass, (x, y), inertia)
+
+
+CLOSING = 1e-12
+"""By this part a length may exceed what closes: the rounding of lengths given in decimals."""
+
+LONGEST = 1e3
+"""Upper end of lengths [m]."""
+
+HEAVIEST = 1e6
+"""Upper end of masses [kg], inertias [kg m^2] and densities [kg/m^3]."""
+
+
+@dataclass(frozen=True, slots=True)
+class FiveBar:
+    """A five-bar leg in m, kg and rad; the defaults are the classic leg's.
+
+    A link without `mass` is a capsule of `radius` and `density` between its joints, and L2 also
+    carries the foot, a ball of `foot_radius`. With `mass` given, those four numbers are the whole
+    links (foot and extension included), `com` their centres along the link from the inner joint
+    (default: the middle of L1..L4), `inertia` those about the centres (default: slender rods,
+    m L^2 / 12).
+
+    Attributes:
+        L1: |AB| [m].
+        L2: |BC| [m].
+        L3: |DC| [m].
+        L4: |ED| [m].
+        L5: |AE| [m]; 0 is coaxial.
+        L6: |CF|, extension of L2 beyond C [m].
+        bend: Angle of CF from the direction of BC, anticlockwise [rad].
+        tilt: Angle of AE from +x of the hip frame, anticlockwise [rad].
+        mode: Working mode (s_A, s_E): theta = alpha + s beta on each side.
+        assembly: +1 or -1, the sign of BDx BCz - BDz BCx.
+        mass: Masses of L1..L4 [kg], or None for capsules.
+        com: Centres along L1..L4 [m], only with `mass`.
+        inertia: Inertias of L1..L4 about their centres [kg m^2], only with `mass`.
+        radius: Of the capsules [m]; with `mass` given it is only drawn.
+        density: Of capsules and foot [kg/m^3].
+        foot_radius: Of the ball at F [m].
+        armature: Rotor inertia of each motor, reflected to A and E [kg m^2].
+        gravity: (x, z) in the hip frame [m/s^2].
+        name: What tables and pictures call the leg.
+    """
+
+    L1: float = 0.040
+    L2: float = 0.060
+    L3: float = 0.060
+    L4: float = 0.040
+    L5: float = 0.030
+    L6: float = 0.0
+    bend: float = 0.0
+    tilt: float = 0.0
+    mode: Mode = (-1, 1)
+    assembly: int = -1
+    mass: Four | None = None
+    com: Four | None = None
+    inertia: Four | None = None
+    radius: float = 0.004
+    density: float = 1200.0
+    foot_radius: float = 0.006
+    armature: float = 1e-5
+    gravity: tuple[float, float] = (0.0, -9.81)
+    name: str = "custom"
+
+    def __post_init__(self) -> None:
+        for key in ("L1", "L2", "L3", "L4", "radius", "foot_radius"):
+            _check(key, getattr(self, key), low=0.0, high=LONGEST, strict=True)
+        for key in ("L5", "L6"):
+            _check(key, getattr(self, key), low=0.0, high=LONGEST)
+        for key in ("density", "armature"):
+            _check(key, getattr(self, key), low=0.0, high=HEAVIEST, strict=key == "density")
+        for key in ("bend", "tilt"):
+            _check(key, getattr(self, key), low=-math.pi, high=math.pi)
+        self._check_modes()
+        self._check_masses()
+        object.__setattr__(self, "gravity", _floats("gravity", self.gravity, 2))
+        lengths = {key: getattr(self, key) for key in ("L1", "L2", "L3", "L4", "L5")}
+        longest = max(lengths, key=lengths.__getitem__)
+        others = sum(lengths.values()) - lengths[longest]
+        if not lengths[longest] <= others * (1.0 + CLOSING):
+            raise GeometryError(
+                f"{longest}: the links can never close: the longest may be at most as long as "
+                f"the other four together, {others:g} m, got {lengths[longest]:g} m"
+            )
+
+    def _check_modes(self) -> None:
+        mode = tuple(self.mode) if isinstance(self.mode, (tuple, list)) else ()
+        if mode not in MODES or not all(type(s) is int for s in mode):
+            raise GeometryError(f"mode must be one of {MODES}, got {self.mode!r}")
+        object.__setattr__(self, "mode", mode)
+        if self.assembly not in (-1, 1) or type(self.assembly) is not int:
+            raise GeometryError(f"assembly must be -1 or 1, got {self.assembly!r}")
+        if not isinstance(self.name, str) or not self.name.isprintable():
+            raise GeometryError(f"name must be a printable string, got {self.name!r}")
+
+    def _check_masses(self) -> None:
+        if self.mass is None:
+            for key in ("com", "inertia"):
+                if getattr(self, key) is not None:
+                    raise GeometryError(f"{key} needs mass beside it: four numbers [kg]")
+            return
+        for key in ("mass", "com", "inertia"):
+            if getattr(self, key) is not None:
+                object.__setattr__(self, key, _floats(key, getattr(self, key), 4))
+        for key in ("mass", "inertia"):
+            for value in getattr(self, key) or ():
+                _check(key, value, low=0.0, high=HEAVIEST, strict=True)
+
+    @property
+    def size(self) -> float:
+        """The longer of the two side chains [m]: what tolerances are relative to."""
+        return max(self.L1 + self.L2 + self.L6, self.L4 + self.L3)
+
+    @property
+    def links(self) -> tuple[Link, Link, Link, Link]:
+        """The inertias of L1..L4; the foot and the extension belong to L2."""
+        lengths = (self.L1, self.L2, self.L3, self.L4)
+        if self.mass is not None:
+            com = self.com or tuple(0.5 * L for L in lengths)
+            inertia = self.inertia or tuple(
+                m * L**2 / 12 for m, L in zip(self.mass, lengths, strict=True)
+            )
+            L1, L2, L3, L4 = (
+                Link(m, (c, 0.0), i) for m, c, i in zip(self.mass, com, inertia, strict=True)
+            )
+            return L1, L2, L3, L4
+        L1, L2, L3, L4 = (capsule(L, self.radius, self.density) for L in lengths)
+        parts = [L2, moved(ball(self.foot_radius, self.density), self.foot_offset)]
+        if self.L6 > 0.0:
+            extension = capsule(self.L6, self.radius, self.density)
+            parts.append(moved(extension, (self.L2, 0.0), self.bend))
+        return L1, combined(*parts), L3, L4
+
+    @property
+    def foot_offset(self) -> tuple[float, float]:
+        """F in the frame of L2 (along, across) [m], from B."""
+        return self.L2 + self.L6 * math.cos(self.bend), self.L6 * math.sin(self.bend)
+
+    @classmethod
+    def load(cls, source: str | Path) -> FiveBar:
+        """Return the leg of a preset's name ("classic") or of a TOML file's path.
+
+        Raises:
+            ConfigError: Unknown preset, unreadable file, unknown key.
+            GeometryError: A number out of its range.
+        """
+        return cls.from_table(read_table(source), str(source))
+
+    @classmethod
+    def from_table(cls, table: Mapping[str, Any], where: str) -> FiveBar:
+        """Return the leg of a TOML table; `where` names the table in messages.
+
+        Raises:
+            ConfigError: An unknown key, or a value out of its range.
+        """
+        known = [field.name for field in fields(cls)]
+        for key in table:
+            if key not in known:
+                raise ConfigError(f"{where}: {unknown('key', key, known)}")
+        try:
+            values: dict[str, Any] = {
+                key: tuple(value) if isinstance(value, list) else value
+                for key, value in table.items()
+            }
+            return cls(**values)
+        except GeometryError as error:
+            raise ConfigError(f"{where}: {error}") from None
+
+
+def read_table(source: str | Path) -> dict[str, Any]:
+    """Return the TOML table of a leg: of a preset's name, or of a file's path.
+
+    Raises:
+        ConfigError: Unknown preset, no such file, not TOML.
+    """
+    presets = resources.shipped("models/legs")
+    path = presets.get(str(source), Path(source))
+    if path.suffix != ".toml":
+        raise ConfigError(f"{unknown('leg preset', str(source), presets)}; or a path to a .toml")
+    return {"name": path.stem, **tables.read(path, "leg")}
+
+
+def _check(key: str, value: Any, **bounds: Any) -> None:
+    """Raise unless a key's value is a finite number within its bounds."""
+    check_number(key, value, UNITS.get(key, ""), **bounds, error=GeometryError)
+
+
+def _floats(key: str, values: object, count: int) -> tuple[float, ...]:
+    """Return values as `count` finite floats."""
+    if not isinstance(values, (tuple, list)) or len(values) != count:
+        raise GeometryError(f"{key} must be {count} numbers [{UNITS[key]}], got {values!r}")
+    for value in values:
+        _check(key, value)
+    return tuple(float(value) for value in values)
+
+
+UNITS = {
+    **dict.fromkeys(("L1", "L2", "L3", "L4", "L5", "L6", "radius", "foot_radius", "com"), "m"),
+    **dict.fromkeys(("bend", "tilt"), "rad"),
+    **dict.fromkeys(("inertia", "armature"), "kg m^2"),
+    "mass": "kg",
+    "density": "kg/m^3",
+    "gravity": "m/s^2",
+}
