@@ -1,0 +1,39 @@
+"""Kinematics of the planar five-bar: pure NumPy, any batch shape, SI units and radians.
+
+Points and angle pairs are (..., 2), Jacobians (..., 2, 2). Working mode and assembly mode are
+arguments, never remembered state.
+"""
+
+from fivebar_sim.kinematics.closure import (
+    Branch,
+    Points,
+    bases,
+    branch,
+    chain_points,
+    closed_points,
+    forward,
+    knees,
+    passive,
+)
+from fivebar_sim.kinematics.home import home
+from fivebar_sim.kinematics.rates import JointMotion, jacobian, joint_motion
+from fivebar_sim.kinematics.reach import inverse, inverse_all, inverse_nearest
+
+__all__ = [
+    "Branch",
+    "JointMotion",
+    "Points",
+    "bases",
+    "branch",
+    "chain_points",
+    "closed_points",
+    "forward",
+    "home",
+    "inverse",
+    "inverse_all",
+    "inverse_nearest",
+    "jacobian",
+    "joint_motion",
+    "knees",
+    "passive",
+]

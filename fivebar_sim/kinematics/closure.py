@@ -1,0 +1,184 @@
+"""Positions from angles: the knees, the loop's closure at C, the foot, and the branch of a pose."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from fivebar_sim.arrays import Array, Bools, as_pairs, at, first_index
+from fivebar_sim.errors import ArgumentError, LoopOpenError
+from fivebar_sim.geometry import FiveBar
+from fivebar_sim.kinematics.planar import angle_between, cross, dot, perp, turned, unit
+
+ROUNDING = 16 * np.finfo(float).eps
+"""Slack of a squared distance d^2 at the edge of reach, relative to d times the coordinates of the
+two points: their rounding, no more."""
+
+
+class Points(NamedTuple):
+    """The joints of a pose [m], hip frame, each (..., 2).
+
+    C_left is the end of L2, C_right that of L3: one point when the loop is closed.
+    """
+
+    B: Array
+    C_left: Array
+    C_right: Array
+    D: Array
+    F: Array
+
+
+class Branch(NamedTuple):
+    """On which branch poses are: signs -1, 0 or +1, each of shape (...); 0 is singular."""
+
+    s_A: NDArray[np.int_]
+    s_E: NDArray[np.int_]
+    assembly: NDArray[np.int_]
+
+
+def bases(leg: FiveBar) -> tuple[Array, Array]:
+    """Return the motor axes A and E [m], hip frame: -+ L5 / 2 (cos tilt, sin tilt)."""
+    half = 0.5 * leg.L5 * unit(leg.tilt)
+    return -half, half
+
+
+def knees(leg: FiveBar, theta: Array) -> tuple[Array, Array]:
+    """Return B = A + L1 e(theta_A) and D = E + L4 e(theta_E) [m], each (..., 2)."""
+    A, E = bases(leg)
+    return A + leg.L1 * unit(theta[..., 0]), E + leg.L4 * unit(theta[..., 1])
+
+
+def loop_joint(leg: FiveBar, B: Array, D: Array, assembly: int | None = None) -> Array:
+    """Return C, the crossing of the circles about B and D on the side that assembly names.
+
+    With d = |BD|, u the unit vector along BD, and n = u turned by +90 deg:
+
+        C = B + a u + assembly h n,   a = (d^2 + L2^2 - L3^2) / 2d,   h = sqrt(L2^2 - a^2)
+
+    where h is computed as sqrt(((L2 + L3)^2 - d^2) (d^2 - (L2 - L3)^2)) / 2d.
+
+    Args:
+        leg: The leg.
+        B: End of L1 [m], (..., 2).
+        D: End of L4 [m], (..., 2).
+        assembly: +1 or -1; None is the leg's own.
+
+    Returns:
+        C [m], (..., 2).
+
+    Raises:
+        LoopOpenError: Unless |L2 - L3| <= d <= L2 + L3 and d > 0 in every pose.
+    """
+    sign = leg.assembly if assembly is None else assembly
+    if sign not in (-1, 1):
+        raise ArgumentError(f"assembly must be -1 or 1, got {assembly!r}")
+    BD = D - B
+    low, high = abs(leg.L2 - leg.L3), leg.L2 + leg.L3
+    d2 = dot(BD, BD)
+    rounding = ROUNDING * (leg.size + leg.L5)  # of the coordinates of B and D [m]
+    slack = rounding * high
+    closed = (d2 >= low**2 - slack) & (d2 <= high**2 + slack) & (d2 > rounding**2)
+    if not closed.all():
+        raise _loop_open(np.sqrt(d2), ~closed, low, high)
+
+    along = (d2 + (leg.L2 - leg.L3) * high) / (2.0 * d2)
+    across = np.sqrt(np.maximum((high**2 - d2) * (d2 - low**2), 0.0)) / (2.0 * d2)
+    return B + along[..., None] * BD + sign * across[..., None] * perp(BD)
+
+
+def _loop_open(d: Array, is_open: Bools, low: float, high: float) -> LoopOpenError:
+    index = first_index(is_open)
+    count = f"in {int(is_open.sum())} of {is_open.size} poses" if is_open.ndim else "here"
+    return LoopOpenError(
+        f"the loop is open {count}: |BD| must be above 0 and in [{low:g}, {high:g}] m, "
+        f"got {float(d[index]):g} m{at(index)}",
+        index,
+    )
+
+
+def closed_points(leg: FiveBar, theta: ArrayLike, assembly: int | None = None) -> Points:
+    """Return the joints of closed poses.
+
+    Args:
+        leg: The leg.
+        theta: (theta_A, theta_E) [rad], (..., 2).
+        assembly: +1 or -1; None is the leg's own.
+
+    Raises:
+        LoopOpenError: Where the links do not meet.
+    """
+    B, D = knees(leg, as_pairs(theta, "theta"))
+    C = loop_joint(leg, B, D, assembly)
+    F = C + (leg.L6 / leg.L2) * turned(C - B, leg.bend)
+    return Points(B, C, C, D, F)
+
+
+def forward(leg: FiveBar, theta: ArrayLike, assembly: int | None = None) -> Array:
+    """Return the foot F of motor angles; C where L6 = 0.
+
+        F = C + (L6 / L2) R(bend) (C - B),   C from `loop_joint`
+
+    Args:
+        leg: The leg.
+        theta: (theta_A, theta_E) [rad], anticlockwise from +x of the hip frame, (..., 2).
+        assembly: +1 or -1, on which side of B->D the joint C lies; None is the leg's own.
+
+    Returns:
+        F [m], hip frame, (..., 2).
+
+    Raises:
+        LoopOpenError: Unless |L2 - L3| <= |BD| <= L2 + L3 and |BD| > 0 in every pose; `.index`
+            is the first open one.
+    """
+    return closed_points(leg, theta, assembly).F
+
+
+def passive(leg: FiveBar, theta: ArrayLike, assembly: int | None = None) -> Array:
+    """Return the knee angles (theta_B, theta_D) of closed poses.
+
+    theta_B turns L1's direction into L2's, theta_D L4's into L3's; both in (-pi, pi].
+
+    Args:
+        leg: The leg.
+        theta: (theta_A, theta_E) [rad], (..., 2).
+        assembly: +1 or -1; None is the leg's own.
+
+    Raises:
+        LoopOpenError: Where the links do not meet.
+    """
+    A, E = bases(leg)
+    p = closed_points(leg, theta, assembly)
+    theta_B = angle_between(p.B - A, p.C_left - p.B)
+    theta_D = angle_between(p.D - E, p.C_right - p.D)
+    return np.stack([theta_B, theta_D], axis=-1)
+
+
+def chain_points(leg: FiveBar, q: Array) -> Points:
+    """Return the joints of the two open chains; |C_left C_right| is the loop gap.
+
+    Args:
+        leg: The leg.
+        q: (theta_A, theta_B, theta_E, theta_D) [rad], knees relative to L1 and L4, (..., 4).
+    """
+    A, E = bases(leg)
+    psi2, psi3 = q[..., 0] + q[..., 1], q[..., 2] + q[..., 3]
+    B, D = A + leg.L1 * unit(q[..., 0]), E + leg.L4 * unit(q[..., 2])
+    C_left, C_right = B + leg.L2 * unit(psi2), D + leg.L3 * unit(psi3)
+    F = C_left + leg.L6 * unit(psi2 + leg.bend)
+    return Points(B, C_left, C_right, D, F)
+
+
+def branch(leg: FiveBar, points: Points) -> Branch:
+    """Return the working mode and the assembly mode of poses, from where their joints are.
+
+        s_A = sign(AF x AB),  s_E = sign(EC x ED),  assembly = sign(BD x BC)
+
+    A loop that is not quite closed is judged by C_right on E's side, by C_left elsewhere.
+    """
+    A, E = bases(leg)
+    s_A = np.sign(cross(points.F - A, points.B - A)).astype(int)
+    s_E = np.sign(cross(points.C_right - E, points.D - E)).astype(int)
+    assembly = np.sign(cross(points.D - points.B, points.C_left - points.B)).astype(int)
+    return Branch(s_A, s_E, assembly)

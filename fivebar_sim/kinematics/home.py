@@ -1,0 +1,73 @@
+"""The rest pose of a leg: as far from every singularity as it can be."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fivebar_sim.arrays import Array
+from fivebar_sim.errors import GeometryError
+from fivebar_sim.geometry import MODES, FiveBar
+from fivebar_sim.kinematics.closure import Points, bases, branch, knees
+from fivebar_sim.kinematics.planar import angle_between, cross, dot, turned
+from fivebar_sim.kinematics.reach import foot_radius_and_angle, inverse_all
+
+GRID = 121
+"""Foot positions tried along x and along z."""
+
+
+def home(leg: FiveBar) -> Array:
+    """Return the rest pose: the foot straight below or above O, far from every singularity.
+
+    Of the foot positions on x = 0, the one whose least sine among the angles at B (between AB and
+    BF), D and C is greatest; the lowest where several are equal. If the leg has none there, the
+    same over the whole plane.
+
+    Args:
+        leg: The leg.
+
+    Returns:
+        (theta_A, theta_B, theta_E, theta_D) [rad], each in (-pi, pi], (4,).
+
+    Raises:
+        GeometryError: If no pose has the leg's working mode and assembly mode at once.
+    """
+    line = np.linspace(-1.0, 1.0, GRID) * (leg.size + leg.L5)
+    column = np.stack([np.zeros(GRID), line], axis=-1)
+    plane = np.stack(np.meshgrid(line, line, indexing="ij"), axis=-1).reshape(-1, 2)
+    for foot in (column, plane):
+        pose = _best(leg, foot)
+        if pose is not None:
+            return pose
+    raise GeometryError(
+        f"no pose has working mode {leg.mode} and assembly mode {leg.assembly} at once"
+    )
+
+
+def _best(leg: FiveBar, foot: Array) -> Array | None:
+    """Return the best pose (4,) of some foot positions (n, 2), or None if none is on the branch."""
+    theta = inverse_all(leg, foot)[:, MODES.index(leg.mode)]
+    found = np.isfinite(theta[:, 0])
+    p = _points(leg, foot[found], theta[found])
+    A, E = bases(leg)
+    AB, BC, BF = p.B - A, p.C_left - p.B, p.F - p.B
+    ED, DC = p.D - E, p.C_right - p.D
+    sines = np.abs([_sine(AB, BF), _sine(ED, DC), _sine(BC, DC)]).min(axis=0)
+    sines[branch(leg, p).assembly != leg.assembly] = 0.0
+    if not sines.size or not sines.max() > 0.0:
+        return None
+    best = int(np.argmax(sines.round(9)))  # rounded: equal ones differ by rounding only
+    theta_A, theta_E = theta[found][best]
+    theta_B, theta_D = angle_between(AB[best], BC[best]), angle_between(ED[best], DC[best])
+    return np.array([theta_A, theta_B, theta_E, theta_D])
+
+
+def _points(leg: FiveBar, foot: Array, theta: Array) -> Points:
+    """Return the joints of poses that are known to put F at `foot`."""
+    B, D = knees(leg, theta)
+    rho, phi = foot_radius_and_angle(leg)
+    C = B + (leg.L2 / rho) * turned(foot - B, -phi)
+    return Points(B, C, C, D, foot)
+
+
+def _sine(a: Array, b: Array) -> Array:
+    return cross(a, b) / np.sqrt(dot(a, a) * dot(b, b))

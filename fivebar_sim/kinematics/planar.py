@@ -1,0 +1,43 @@
+"""Plane vectors (..., 2) in the leg's plane: direction, quarter turn, cross product, wrapping."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from fivebar_sim.arrays import Array
+
+
+def unit(angle: ArrayLike) -> Array:
+    """Return (cos, sin) of angles [rad], shape (...) to (..., 2)."""
+    return np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+
+
+def perp(v: Array) -> Array:
+    """Return v turned by +90 deg: (x, z) to (-z, x)."""
+    return np.stack([-v[..., 1], v[..., 0]], axis=-1)
+
+
+def cross(a: Array, b: Array) -> Array:
+    """Return a_x b_z - a_z b_x, shape (...)."""
+    return a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
+
+
+def dot(a: Array, b: Array) -> Array:
+    """Return a_x b_x + a_z b_z, shape (...)."""
+    return a[..., 0] * b[..., 0] + a[..., 1] * b[..., 1]
+
+
+def angle_between(a: Array, b: Array) -> Array:
+    """Return the angle from a to b, anticlockwise, in (-pi, pi] [rad], shape (...)."""
+    return np.arctan2(cross(a, b) + 0.0, dot(a, b))  # + 0.0: -0.0 would give -pi
+
+
+def wrap(angle: Array) -> Array:
+    """Return angles brought to [-pi, pi) by whole turns [rad]."""
+    return (angle + np.pi) % (2.0 * np.pi) - np.pi
+
+
+def turned(v: Array, angle: float) -> Array:
+    """Return v turned by angle [rad], anticlockwise."""
+    return np.cos(angle) * v + np.sin(angle) * perp(v)

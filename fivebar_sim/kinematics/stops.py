@@ -1,0 +1,31 @@
+"""How far the joints may turn: what keeps a leg in its assembly mode."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fivebar_sim.arrays import Array
+
+C_STOP = float(np.radians(2.0))
+"""Where the angle at C is stopped, from 0 and from 180 deg [rad]."""
+
+MOTOR_RANGE = 2.0 * np.pi
+"""How far the motors turn to either side of theta = 0 [rad]."""
+
+
+def angle_at_C(q: Array) -> Array:
+    """Return theta_A + theta_B - theta_E - theta_D, from L3's direction to L2's [rad].
+
+    It is a multiple of pi where B, C and D are in line; between two such, the leg keeps one
+    assembly mode.
+
+    Args:
+        q: (theta_A, theta_B, theta_E, theta_D) [rad], (..., 4).
+    """
+    return q[..., 0] + q[..., 1] - q[..., 2] - q[..., 3]
+
+
+def stops_at_C(rest: Array) -> tuple[float, float]:
+    """Return the range of the angle at C in the assembly mode of a rest pose (4,) [rad]."""
+    straight = float(np.floor(angle_at_C(rest) / np.pi) * np.pi)
+    return straight + C_STOP, straight + np.pi - C_STOP
