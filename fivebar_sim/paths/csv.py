@@ -1,0 +1,251 @@
+"""The foot path of a CSV file: a smooth spline in time through its points.
+
+The header is `time_s,x_mm,z_mm` or `time_s,x_m,z_m`, columns in any order; positions are in the
+hip frame. Lines that start with # are comments. Times are in seconds and need not be regular.
+"""
+
+from __future__ import annotations
+
+import math
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple, Self
+
+import msgspec
+import numpy as np
+from numpy.typing import ArrayLike
+
+from fivebar_sim.arrays import Array
+from fivebar_sim.errors import ArgumentError, ConfigError, unknown
+from fivebar_sim.paths.base import TIME_ROUNDING, FootPath, Sample, check_number
+
+if TYPE_CHECKING:
+    from scipy.interpolate import CubicSpline
+
+HEADERS = {("time_s", "x_mm", "z_mm"): 1e-3, ("time_s", "x_m", "z_m"): 1.0}
+"""The legal headers, each with the length of its unit [m]."""
+
+SAME_POINT = 1e-9
+"""Two points this close are one: the last point repeats the first [m]."""
+
+
+LARGEST = 1e6
+"""Upper end of numbers in a CSV: a kilometre in mm, eleven days in s."""
+
+
+class Track(NamedTuple):
+    """The points of a CSV file.
+
+    Attributes:
+        time: Strictly growing from 0 [s], shape (n,).
+        foot: Hip frame (x, z) [m], shape (n, 2).
+    """
+
+    time: Array
+    foot: Array
+
+    @property
+    def span(self) -> float:
+        """Last time minus first [s]."""
+        return float(self.time[-1])
+
+    @property
+    def closed(self) -> bool:
+        """Whether the last point repeats the first."""
+        return bool(np.max(np.abs(self.foot[-1] - self.foot[0])) <= SAME_POINT)
+
+
+class _Curve(NamedTuple):
+    spline: CubicSpline
+    span: float
+    period: float | None
+
+
+class Csv(FootPath, frozen=True, tag="csv", dict=True):
+    """A cubic spline in time through the points of a CSV file, smooth up to the acceleration.
+
+    The file's first time becomes t = 0. The file is read when first needed, once per object;
+    `resolve` reads it at once.
+
+    A periodic path whose last point repeats the first has the sampled span for a period. Otherwise
+    it returns to its first point after one more sampling interval, the median one, or at `period`.
+
+    Attributes:
+        file: Name of the CSV, relative to the scenario's folder (unresolved: the current one).
+        periodic: Whether the path repeats, smoothly across the seam; else it ends with its file.
+        cycle: The key `period` of a table: the period, where the rule above is not meant [s].
+    """
+
+    file: str
+    periodic: bool = False
+    cycle: float | None = msgspec.field(default=None, name="period")
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not self.file or "\0" in self.file:
+            raise ArgumentError(f"file must be the name of a CSV file, got {self.file!r}")
+        if self.cycle is not None:
+            check_number("period", self.cycle, "s", low=0.0, strict=True)
+            if not self.periodic:
+                raise ArgumentError(f"period needs periodic = true, got {self.cycle!r} s without")
+
+    @property
+    def period(self) -> float | None:
+        """Time after which the path repeats [s], or None if it is not periodic."""
+        return self._curve.period
+
+    @property
+    def end(self) -> float:
+        """The sampled span [s], or inf if the path is periodic."""
+        return self._curve.span if self._curve.period is None else math.inf
+
+    def nominal(self, time: ArrayLike) -> Sample:
+        """Return the spline and its own derivatives; see `FootPath.nominal`.
+
+        The boundary is periodic, or else "not-a-knot".
+
+        Raises:
+            ArgumentError: Unless every time is in [0, end].
+            ConfigError: What `resolve` would raise, if the file was not read yet.
+        """
+        spline, _, period = self._curve
+        t = self._times(time)
+        t = t if period is None else np.mod(t, period)
+        return Sample(spline(t), spline(t, 1), spline(t, 2))
+
+    def resolve(self, folder: Path) -> Self:
+        """Return the path bound to the file in folder, read and checked.
+
+        Raises:
+            ConfigError: The file cannot be read, a line of it is illegal (the message gives its
+                number), the period does not fit the points, or the path ends within the ramp.
+        """
+        bound = msgspec.structs.replace(self, file=str((folder / self.file).absolute()))
+        _ = bound._curve
+        return bound
+
+    @cached_property
+    def _curve(self) -> _Curve:
+        from scipy.interpolate import CubicSpline  # slow to import, and only this kind needs it
+
+        track = read_track(Path(self.file))
+        if not self.periodic:
+            if not self.ramp <= track.span:
+                raise ConfigError(
+                    f"{self.file}: ramp must be in [0, {track.span:g}] s, the time that the path "
+                    f"lasts, got {self.ramp:g} s"
+                )
+            return _Curve(CubicSpline(*track, bc_type="not-a-knot"), track.span, None)
+        time, foot = _closed(track, self.cycle, self.file)
+        return _Curve(CubicSpline(time, foot, bc_type="periodic"), track.span, float(time[-1]))
+
+
+def _closed(track: Track, period: float | None, where: str) -> Track:
+    """Return a track whose last point is its first, one period later."""
+    time, foot = track
+    span = track.span
+    distinct = len(time) - track.closed
+    if distinct < 3:
+        raise ConfigError(
+            f"{where}: a periodic path needs at least 3 distinct points, got {distinct}"
+        )
+    if period is None:
+        period = span if track.closed else span + float(np.median(np.diff(time)))
+    same = math.isclose(period, span, rel_tol=TIME_ROUNDING)
+    if same and track.closed:
+        return Track(time, np.concatenate([foot[:-1], foot[:1]]))
+    if same or not period > span:
+        relation = ">=" if track.closed else ">"
+        raise ConfigError(
+            f"{where}: period must be {relation} {span:.9g} s, the sampled span, got {period:.9g} s"
+        )
+    return Track(np.append(time, period), np.concatenate([foot, foot[:1]]))
+
+
+def read_track(file: Path) -> Track:
+    """Return the points of a CSV file, in m and from t = 0.
+
+    Raises:
+        ConfigError: The file cannot be read, is not UTF-8, has another header, a row with the wrong
+            number of cells, a cell that is no finite number, times that do not grow, or one row.
+    """
+    lines = _lines(file)
+    if not lines:
+        raise ConfigError(f"{file}: no header; {_legal_headers()}")
+    (number, header), *rows = lines
+    order, scale = _columns(header, f"{file}, line {number}")
+    table = np.empty((len(rows), 3))
+    for k, (number, cells) in enumerate(rows):
+        where = f"{file}, line {number}"
+        if len(cells) != len(header):
+            raise ConfigError(
+                f"{where}: a row must have {len(header)} cells ({','.join(header)}), got "
+                f"{len(cells)}"
+            )
+        table[k] = [_number(cells[i], header[i], where) for i in order]
+        if k > 0 and not table[k, 0] > table[k - 1, 0]:
+            word = "repeated" if table[k, 0] == table[k - 1, 0] else "not sorted"
+            raise ConfigError(
+                f"{where}: times are {word}: time_s must be > {float(table[k - 1, 0])!r} s of line "
+                f"{rows[k - 1][0]}, got {float(table[k, 0])!r} s"
+            )
+    if len(rows) < 2:
+        raise ConfigError(
+            f"{file}: a path needs at least 2 rows, or 3 distinct ones if periodic, got {len(rows)}"
+        )
+    return Track(table[:, 0] - table[0, 0], scale * table[:, 1:])
+
+
+def _lines(file: Path) -> list[tuple[int, list[str]]]:
+    """Return the lines that are neither blank nor comments, as (line number, stripped cells)."""
+    try:
+        raw = file.read_bytes()
+    except OSError as error:
+        raise ConfigError(f"cannot read foot path {file}: {error.strerror}") from None
+    try:
+        text = raw.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        number = raw.count(b"\n", 0, error.start) + 1
+        byte = raw[error.start]
+        raise ConfigError(f"{file}, line {number}: must be UTF-8, got byte 0x{byte:02x}") from None
+    stripped = ((k, line.strip()) for k, line in enumerate(text.split("\n"), start=1))
+    return [
+        (k, [cell.strip() for cell in line.split(",")])
+        for k, line in stripped
+        if line and not line.startswith("#")
+    ]
+
+
+def _columns(header: list[str], where: str) -> tuple[list[int], float]:
+    """Return where time, x and z stand in a header, and the length of its unit [m]."""
+    for legal, scale in HEADERS.items():
+        if sorted(header) == sorted(legal):
+            return [header.index(name) for name in legal], scale
+    known = {name for legal in HEADERS for name in legal}
+    nearest = max(HEADERS, key=lambda legal: len(set(legal) & set(header)))
+    strange = [name for name in header if name not in known]
+    missing = [name for name in nearest if name not in header]
+    if strange:
+        problem = unknown("column", strange[0], known)
+    elif missing:
+        problem = f"no column {missing[0]!r}"
+    else:
+        problem = "too many columns"
+    raise ConfigError(f"{where}: {problem}; {_legal_headers()}, got {','.join(header)!r}")
+
+
+def _legal_headers() -> str:
+    names = " or ".join(",".join(legal) for legal in HEADERS)
+    return f"the header must be {names}, in any order"
+
+
+def _number(cell: str, column: str, where: str) -> float:
+    """Return a cell as a finite number."""
+    try:
+        value = math.nan if "_" in cell else float(cell)
+    except ValueError:
+        value = math.nan
+    if not abs(value) <= LARGEST:
+        legal = f"[{-LARGEST:g}, {LARGEST:g}]"
+        raise ConfigError(f"{where}: {column} must be a number in {legal}, got {cell!r}")
+    return value
