@@ -1,0 +1,118 @@
+"""What the leg shall do: the foot path at every step, and the joint angles that follow it."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from fivebar_sim import kinematics, workspace
+from fivebar_sim.arrays import Array, Bools
+from fivebar_sim.errors import UnreachableError
+from fivebar_sim.geometry import FiveBar
+from fivebar_sim.kinematics.stops import C_STOP, MOTOR_RANGE, angle_at_C, stops_at_C
+from fivebar_sim.paths import FootPath
+
+
+class Motion(NamedTuple):
+    """A planned motion at the times t_k = k h, k = 0..N; angles are continuous in time.
+
+    Attributes:
+        time: [s], (N + 1,).
+        foot: [m], (N + 1, 2); foot_dot and foot_ddot are its rates.
+        q: (theta_A, theta_B, theta_E, theta_D) [rad], (N + 1, 4); q_dot and q_ddot are its rates.
+    """
+
+    time: Array
+    foot: Array
+    foot_dot: Array
+    foot_ddot: Array
+    q: Array
+    q_dot: Array
+    q_ddot: Array
+
+    @property
+    def timestep(self) -> float:
+        """The time h between two rows [s]."""
+        return float(self.time[1])
+
+
+def plan(leg: FiveBar, path: FootPath, steps: int, timestep: float) -> Motion:
+    """Return the motion of a leg along a path, from the analytic inverse kinematics.
+
+    Args:
+        leg: The leg; it moves in its own working mode and assembly mode.
+        path: The foot's path.
+        steps: N.
+        timestep: h [s].
+
+    Raises:
+        UnreachableError: Where the path leaves the workspace, where the leg's assembly mode does
+            not reach, or where a joint would pass its stop; says at what time, how far out and
+            what is nearest. `.index` is the step.
+        SingularError: Where a side chain is straight or folded on the way.
+    """
+    time: Array = np.arange(steps + 1, dtype=np.float64) * timestep
+    foot, foot_dot, foot_ddot = path.at(time)
+    try:
+        kinematics.inverse(leg, foot)
+    except UnreachableError as error:
+        raise _out_of_reach(leg, foot, time, error) from None
+    q, q_dot, q_ddot = kinematics.joint_motion(leg, foot, foot_dot, foot_ddot)
+    rest = kinematics.home(leg)
+    q = _continuous(rest, q)
+    _check_stops(leg, rest, foot, time, q)
+    return Motion(time, foot, foot_dot, foot_ddot, q, q_dot, q_ddot)
+
+
+def _continuous(rest: Array, q: Array) -> Array:
+    """Return angles without jumps, begun in the turn of the rest pose.
+
+    The knees stay within half a turn in any working mode; the motors may go round. Theta_E starts
+    in the turn that puts the angle at C between its stops, as in the rest pose.
+    """
+    q = np.unwrap(q, axis=0)
+    turn = 2.0 * np.pi
+    q[:, [0, 2]] += turn * np.round((rest - q[0]) / turn)[[0, 2]]
+    middle = 0.5 * sum(stops_at_C(rest))
+    q[:, 2] += turn * np.round((angle_at_C(q[0]) - middle) / turn)
+    return q
+
+
+def _check_stops(leg: FiveBar, rest: Array, foot: Array, time: Array, q: Array) -> None:
+    low, high = stops_at_C(rest)
+    angle = angle_at_C(q)
+    flipped = (angle < low - C_STOP) | (angle > high + C_STOP)
+    _refuse(flipped, foot, time, f"needs the other assembly mode; the leg's is {leg.assembly:+d}")
+    stopped = (angle < low) | (angle > high)
+    limits = f"{np.degrees(C_STOP):.0f} and {180 - np.degrees(C_STOP):.0f} deg"
+    _refuse(stopped, foot, time, f"passes the stops of the angle at C, {limits}")
+    for name, theta in (("theta_A", q[:, 0]), ("theta_E", q[:, 2])):
+        wound = np.abs(theta) > MOTOR_RANGE
+        _refuse(wound, foot, time, f"winds {name} beyond its range of +-360 deg")
+
+
+def _refuse(bad: Bools, foot: Array, time: Array, what: str) -> None:
+    if bad.any():
+        k = int(np.argmax(bad))
+        raise UnreachableError(f"path {what}: at t = {time[k]:g} s, foot at {_mm(foot[k])}", (k,))
+
+
+def _out_of_reach(
+    leg: FiveBar, foot: Array, time: Array, error: UnreachableError
+) -> UnreachableError:
+    """Return the error of a path that leaves the workspace, with the nearest reachable point."""
+    (k,) = error.index
+    lost = f"path out of reach at t = {time[k]:g} s: the foot at {_mm(foot[k])}"
+    if leg.L6 > 0.0:
+        return UnreachableError(f"{lost}; {error}", error.index)
+    nearest = workspace.nearest(leg, foot[k])
+    out = float(np.hypot(*(foot[k] - nearest)))
+    return UnreachableError(
+        f"{lost} is {1e3 * out:.3g} mm out; the nearest reachable point is {_mm(nearest)}",
+        error.index,
+    )
+
+
+def _mm(point: Array) -> str:
+    return f"({1e3 * point[0]:.2f}, {1e3 * point[1]:.2f}) mm"

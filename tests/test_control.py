@@ -1,0 +1,198 @@
+"""Controllers from other packages: found by their entry point, and refused in one line."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import msgspec
+import numpy as np
+import pytest
+
+from controllers.servo import Servo
+from fivebar_sim import control, motion, rollout
+from fivebar_sim.arrays import Array
+from fivebar_sim.errors import ConfigError
+from fivebar_sim.scenario import Scenario
+from fivebar_sim.servo import Integrator
+
+Plug = Callable[..., None]
+
+LAW = '''
+import msgspec
+
+class Ahead(msgspec.Struct, frozen=True, kw_only=True):
+    """Send the angles of the path, and a lead."""
+    lead: float = 0.0
+    def setpoints(self, leg, servo, motion, integrator):
+        return motion.q[1:][:, [0, 2]] + self.lead
+
+class Wrong(msgspec.Struct, frozen=True, kw_only=True):
+    kind: str = "shape"
+    def setpoints(self, leg, servo, motion, integrator):
+        u = motion.q[1:][:, [0, 2]]
+        if self.kind == "shape":
+            return u[:-1]
+        u[3, 1] = float(self.kind)
+        return u
+
+class Silent(msgspec.Struct):
+    pass
+
+def law(): ...
+'''
+
+
+@pytest.fixture
+def plug(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Plug:
+    """Return a function that installs a package with controllers for the time of a test."""
+    monkeypatch.setattr(sys, "modules", dict(sys.modules))  # forgets what is imported meanwhile
+
+    def install(package: str, entries: dict[str, str], code: str = LAW) -> None:
+        site = tmp_path / package
+        site.mkdir()
+        (site / f"{package}.py").write_text(code, encoding="utf-8")
+        info = site / f"{package}-1.0.dist-info"
+        info.mkdir()
+        (info / "METADATA").write_text(f"Name: {package}\nVersion: 1.0\n", encoding="utf-8")
+        lines = [f"{name} = {value}" for name, value in entries.items()]
+        text = "\n".join(["[fivebar_sim.controllers]", *lines, ""])
+        (info / "entry_points.txt").write_text(text, encoding="utf-8")
+        monkeypatch.syspath_prepend(site)
+
+    return install
+
+
+def load(*settings: str) -> Scenario:
+    return Scenario.load("classic-ellipse", ["duration=0.8", *settings])
+
+
+def refused(*settings: str) -> str:
+    with pytest.raises(ConfigError) as caught:
+        rollout.plan(load(*settings))
+    assert "\n" not in str(caught.value)
+    return str(caught.value)
+
+
+# law
+
+
+def test_servo_is_found() -> None:
+    assert control.find("servo") is Servo
+    assert isinstance(Servo(), control.Setpoints)
+
+
+def test_servo_sends_the_angles_of_the_path_at_the_integrators_time() -> None:
+    scenario = load()
+    leg, gains = scenario.leg, scenario.servo
+    wanted = motion.plan(leg, scenario.path, 800, 0.001)
+    q = wanted.q[:, [0, 2]]
+    lead = gains.kd / gains.kp * np.diff(q, axis=0) / 0.001
+    instants: dict[Integrator, Array] = {"discrete": q[1:], "implicitfast": q[:-1]}
+    for integrator, then in instants.items():
+        none = Servo().setpoints(leg, gains, wanted, integrator)
+        np.testing.assert_array_equal(none, then)
+        shaped = Servo(feedforward="velocity").setpoints(leg, gains, wanted, integrator)
+        np.testing.assert_allclose(shaped, then + lead, rtol=0, atol=1e-15)  # rounding
+
+
+def test_controller_of_another_package_drives_the_leg(plug: Plug) -> None:
+    plug("strangers", {"ahead": "strangers:Ahead"})
+    assert set(control.known()) >= {"servo", "ahead"}
+    scenario = load("controller.name=ahead")
+    assert isinstance(scenario.controller, control.Setpoints)
+    assert scenario.table()["controller"] == {"name": "ahead", "lead": 0.0}
+    ours, theirs = rollout.run(load()), rollout.run(scenario)
+    np.testing.assert_array_equal(theirs.record["foot_x"], ours.record["foot_x"])
+    lead = load("controller={name='ahead', lead=0.01}")
+    assert msgspec.to_builtins(lead.controller) == {"lead": 0.01}
+    np.testing.assert_allclose(rollout.plan(lead).ctrl, rollout.plan(scenario).ctrl + 0.01)
+
+
+def test_another_name_keeps_the_keys_that_both_have(plug: Plug) -> None:
+    plug("strangers", {"ahead": "strangers:Ahead"})
+    switched = load("controller.feedforward=velocity", "controller.name=ahead")
+    assert msgspec.to_builtins(switched.controller) == {"lead": 0.0}
+    back = load("controller={name='ahead', lead=1}", "controller.name=servo")
+    assert back.controller == Servo()
+
+
+# edge
+
+
+def test_one_controller_seen_twice_is_one(plug: Plug) -> None:
+    plug("strangers", {"servo": "controllers.servo:Servo"})  # as from two copies of one package
+    assert control.find("servo") is Servo
+
+
+# refusal
+
+
+def test_two_controllers_of_one_name_are_refused(plug: Plug) -> None:
+    plug("strangers", {"servo": "strangers:Ahead"})
+    message = refused()
+    assert "two controllers are called 'servo': " in message
+    assert "strangers:Ahead" in message
+    assert "controllers.servo:Servo" in message
+
+
+def test_unknown_controller_is_refused_with_the_known_ones(plug: Plug) -> None:
+    plug("strangers", {"ahead": "strangers:Ahead"})
+    assert refused("controller.name=ahaed") == (
+        "classic-ellipse: controller.name: unknown controller 'ahaed'; known: ahead, servo "
+        "(did you mean 'ahead'?)"
+    )
+
+
+@pytest.mark.parametrize(
+    ("kind", "came"),
+    [("shape", "(799, 2)"), ("nan", "(800, 2)"), ("inf", "(800, 2)")],
+)
+def test_setpoints_of_wrong_shape_or_not_finite_are_refused(
+    plug: Plug, kind: str, came: str
+) -> None:
+    plug("strangers", {"wrong": "strangers:Wrong"})
+    message = refused(f"controller={{name='wrong', kind='{kind}'}}")
+    assert message.startswith(
+        "controller 'wrong' must plan finite setpoints [rad] of shape (800, 2)"
+    )
+    assert came in message
+
+
+@pytest.mark.parametrize(
+    ("value", "code", "message"),
+    [
+        ("strangers:Gone", LAW, "cannot load controller 'odd' from strangers:Gone: Attribute"),
+        ("nowhere:Law", LAW, "cannot load controller 'odd' from nowhere:Law: ModuleNotFound"),
+        ("strangers:Law", "1 / 0", "cannot load controller 'odd' from strangers:Law: ZeroDivision"),
+        ("strangers:Law", "def", "cannot load controller 'odd' from strangers:Law: SyntaxError"),
+        ("strangers:law", LAW, "controller 'odd': strangers:law must be a msgspec Struct with"),
+        ("strangers:Silent", LAW, "controller 'odd': strangers:Silent must be a msgspec Struct"),
+    ],
+)
+def test_what_is_no_controller_is_refused(plug: Plug, value: str, code: str, message: str) -> None:
+    plug("strangers", {"odd": value}, code)
+    with pytest.raises(ConfigError) as caught:
+        control.find("odd")
+    assert str(caught.value).startswith(message)
+
+
+def test_command_finds_a_controller_and_refuses_its_nonsense(plug: Plug, tmp_path: Path) -> None:
+    plug("strangers", {"wrong": "strangers:Wrong"})
+    command = [str(Path(sys.executable).with_name("fivebar")), "run", "classic-ellipse"]
+    done = subprocess.run(
+        [*command, "--out", "run", "--set", "duration=0.8", "--set", "controller.name=wrong"],
+        cwd=tmp_path,
+        env={**os.environ, "PYTHONPATH": str(tmp_path / "strangers")},
+        capture_output=True,
+        text=True,
+    )
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr == (
+        "fivebar: classic-ellipse: controller 'wrong' must plan finite setpoints [rad] of shape "
+        "(800, 2), got float64 of shape (799, 2)\n"
+    )
+    assert not (tmp_path / "run").exists()
