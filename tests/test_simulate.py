@@ -1,0 +1,150 @@
+"""The step itself: what the integrator applied, batches, and what a broken run says."""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+import pytest
+from mujoco.batch import Batch
+
+from fivebar_sim import rollout, simulate
+from fivebar_sim.errors import ArgumentError, DivergedError
+from fivebar_sim.rollout import Plan
+from fivebar_sim.scenario import Scenario
+from fivebar_sim.simulate import States
+
+INTEGRATORS = ("discrete", "implicitfast")
+
+
+def planned(*settings: str) -> Plan:
+    return rollout.plan(Scenario.load("classic-ellipse", settings))
+
+
+def balance(plan: Plan) -> tuple[np.ndarray, np.ndarray]:
+    """Return the generalised force that each step's momentum asks for, and the recorded torque.
+
+    M (v+ - v) / h + bias - constraint force, with M and bias at the start of the step, and the
+    constraint force that the solver found in it.
+    """
+    h, mj = plan.motion.timestep, plan.model
+    batch = Batch(mj, 1, 1)
+    batch.qpos = plan.motion.q[:1]
+    out = batch.rollout(len(plan.ctrl), plan.ctrl[None], record=("qpos", "qvel", "qfrc_constraint"))
+    q, v, force = (out[name][0] for name in ("qpos", "qvel", "qfrc_constraint"))
+    before_q, before_v = (
+        np.concatenate([first[None], rows[:-1]])
+        for first, rows in ((plan.motion.q[0], q), (np.zeros(4), v))
+    )
+    data, M, needed = mujoco.MjData(mj), np.zeros((4, 4)), np.empty_like(v)
+    for k in range(len(v)):
+        data.qpos[:], data.qvel[:] = before_q[k], before_v[k]
+        mujoco.mj_forward(mj, data)
+        mujoco.mj_fullM(mj, data, M)
+        needed[k] = M @ (v[k] - before_v[k]) / h + data.qfrc_bias - force[k]
+    record = rollout.execute(plan).record
+    torque = np.zeros_like(needed)
+    torque[:, 0], torque[:, 2] = record["torque_A"], record["torque_E"]
+    return needed, torque
+
+
+@pytest.mark.parametrize("limit", [None, 0.05, 0.003])
+@pytest.mark.parametrize("integrator", INTEGRATORS)
+def test_torque_balances_momentum_at_every_step(integrator: str, limit: float | None) -> None:
+    settings = [f"sim.integrator={integrator}", "duration=1.0"]
+    settings += [f"servo.limit={limit}"] if limit else []
+    plan = planned(*settings)
+    needed, torque = balance(plan)
+    # rounding: M v / h and the constraint force, tens of times the torque, cancel in the balance
+    np.testing.assert_allclose(needed, torque, rtol=0, atol=1e-9 * np.abs(torque).max())
+    if limit:
+        q = np.concatenate([plan.motion.q[:1], simulated(plan).qpos[0][:-1]])[:, [0, 2]]
+        clips = np.abs(8.0 * (plan.ctrl - q)) > limit
+        assert 0.05 < clips.mean() <= 1.0
+
+
+def simulated(plan: Plan) -> States:
+    return simulate.simulate(plan.model, plan.motion.q[:1], plan.ctrl[None])
+
+
+def test_raw_sensor_is_not_the_torque() -> None:
+    """The actuator sensor misses what the integrator adds: the reason for `applied_torque`."""
+    plan = planned()
+    batch = Batch(plan.model, 1, 1)
+    batch.qpos = plan.motion.q[:1]
+    raw = batch.rollout(4000, plan.ctrl[None], record=("actuator_force",))["actuator_force"][0]
+    torque = rollout.execute(plan).record["torque_A"]
+    assert np.sqrt(np.mean((raw[:, 0] - torque) ** 2)) > 10 * np.sqrt(np.mean(torque**2))
+
+
+@pytest.mark.parametrize("nthread", [1, 2])
+def test_batch_is_bit_identical_to_one_by_one(nthread: int) -> None:
+    legs = [
+        planned("duration=1.5", f"leg.L2={0.055 + 0.0003 * i}", f"path.frequency={1 + 0.05 * i}",
+                f"servo.kp={6.0 + 0.1 * i}", f"sim.integrator={INTEGRATORS[i % 2]}")
+        for i in range(64)
+    ]  # fmt: skip
+    together = rollout.run_all(legs, nthread)
+    for plan, result in zip(legs, together, strict=True):
+        alone = rollout.execute(plan).record
+        assert result.scenario is plan.scenario
+        for name, column in result.record.items():
+            np.testing.assert_array_equal(column, alone[name], err_msg=name)
+
+
+def test_batch_is_bit_identical_to_a_plain_loop() -> None:
+    plan = planned("duration=1.0")
+    states, data = simulated(plan), mujoco.MjData(plan.model)
+    data.qpos[:] = plan.motion.q[0]
+    for k, u in enumerate(plan.ctrl):
+        data.ctrl[:] = u
+        mujoco.mj_step(plan.model, data)
+        np.testing.assert_array_equal(states.qpos[0, k], data.qpos)
+        np.testing.assert_array_equal(states.qvel[0, k], data.qvel)
+
+
+def test_chunks_give_the_bits_of_one_piece(monkeypatch: pytest.MonkeyPatch) -> None:
+    plan = planned("duration=1.0")
+    whole = simulated(plan)
+    monkeypatch.setattr(simulate, "CHUNK", 77)
+    for one, other in zip(whole, simulated(plan), strict=True):
+        np.testing.assert_array_equal(one, other)
+
+
+def test_refusal_of_setpoints_that_are_not_finite() -> None:
+    plan = planned()
+    ctrl = plan.ctrl.copy()
+    ctrl[7, 1] = np.nan
+    with pytest.raises(ArgumentError, match="ctrl must be finite"):
+        simulate.simulate(plan.model, plan.motion.q[:1], ctrl[None])
+    with pytest.raises(ArgumentError, match=r"ctrl \(nsim, N, 2\)"):
+        simulate.simulate(plan.model, plan.motion.q[:1], ctrl)
+
+
+def states(**changes: np.ndarray) -> States:
+    """Return ten good steps of 1 ms, with changes."""
+    good = States(
+        time=np.arange(1.0, 11.0)[None] * 1e-3,
+        qpos=np.zeros((1, 10, 4)),
+        qvel=np.zeros((1, 10, 4)),
+        warnings=np.zeros(1, dtype=int),
+    )
+    simulate.check(good, 1e-3)
+    return good._replace(**changes)
+
+
+def test_refusal_of_each_breakdown() -> None:
+    spoilt = np.zeros((1, 10, 4))
+    spoilt[0, 4, 2] = np.nan
+    fast = np.zeros((1, 10, 4))
+    fast[0, 6, 0] = 2e4
+    stuck = np.minimum(np.arange(1, 11), 3)[None] * 1e-3
+    for bad, time in (
+        (states(qpos=spoilt), 0.005),
+        (states(qvel=spoilt), 0.005),
+        (states(qvel=fast), 0.007),
+        (states(time=stuck), 0.004),
+        (states(warnings=np.array([2])), 0.010),
+    ):
+        with pytest.raises(DivergedError) as caught:
+            simulate.check(bad, 1e-3)
+        assert caught.value.time == pytest.approx(time)
