@@ -1,0 +1,127 @@
+"""A run directory: scenario.toml, metrics.json, rollout.parquet, recording.rrd; whole or absent."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import tempfile
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import tomli_w
+
+from fivebar_sim import recording
+from fivebar_sim.arrays import Array
+from fivebar_sim.errors import RunDirectoryError
+from fivebar_sim.paths import Csv
+from fivebar_sim.scenario import copied_name
+
+if TYPE_CHECKING:
+    from fivebar_sim.rollout import Result
+
+FILES = ("scenario.toml", "metrics.json", "rollout.parquet", "recording.rrd")
+
+
+def write(result: Result, path: Path) -> Path:
+    """Write a run directory: beside its place first, then renamed, so that it is never half there.
+
+    An existing run directory (or an empty one) is exchanged; anything else there is refused.
+
+    Raises:
+        RunDirectoryError: The place is taken by something else, or cannot be written.
+    """
+    check_place(path)
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        stage = Path(tempfile.mkdtemp(prefix=f".{path.name}.", suffix=".partial", dir=path.parent))
+    except OSError as error:
+        raise RunDirectoryError(f"cannot write {path}: {error.strerror}") from None
+    try:
+        _fill(stage, result)
+        stage.chmod(0o755)
+        _exchange(stage, path)
+    except OSError as error:
+        raise RunDirectoryError(f"cannot write {path}: {error.strerror or error}") from None
+    finally:
+        shutil.rmtree(stage, ignore_errors=True)
+    return path
+
+
+def check_place(path: Path) -> None:
+    """Raise unless a run directory may be written at path.
+
+    Raises:
+        RunDirectoryError: A file or a directory of something else is there, or no directory can
+            be made there.
+    """
+    try:
+        ours = path.is_dir() and (is_run(path) or not any(path.iterdir()))
+        taken = not ours and (path.exists() or path.is_symlink())
+        there = next(p for p in path.absolute().parents if p.exists())
+    except OSError as error:
+        raise RunDirectoryError(f"cannot write {path}: {error.strerror}") from None
+    if taken:
+        raise RunDirectoryError(f"cannot write {path}: something that is no run directory is there")
+    if not there.is_dir() or not os.access(there, os.W_OK | os.X_OK):
+        raise RunDirectoryError(f"cannot write {path}: {there} is not a directory one may write in")
+
+
+def is_run(path: Path) -> bool:
+    """Return whether path is a complete run directory."""
+    return all((path / name).is_file() for name in FILES)
+
+
+def check_run(path: Path) -> None:
+    """Raise unless path is a complete run directory.
+
+    Raises:
+        RunDirectoryError: Naming what is missing.
+    """
+    missing = [name for name in FILES if not (path / name).is_file()]
+    if missing:
+        what = f"it lacks {', '.join(missing)}" if path.is_dir() else "no such directory"
+        raise RunDirectoryError(f"{path} is no run directory: {what}")
+
+
+def _fill(stage: Path, result: Result) -> None:
+    """Write the files of a run into an empty directory."""
+    scenario = result.scenario
+    (stage / "scenario.toml").write_text(tomli_w.dumps(scenario.table()), encoding="utf-8")
+    if isinstance(scenario.path, Csv):
+        shutil.copyfile(scenario.path.file, stage / copied_name(scenario.path))
+    text = json.dumps(result.metrics, indent=2, allow_nan=False)
+    (stage / "metrics.json").write_text(text + "\n", encoding="utf-8")
+    write_record(stage / "rollout.parquet", result.record)
+    recording.write(
+        stage / "recording.rrd", scenario.leg, result.record, result.metrics, scenario.name
+    )
+
+
+def write_record(path: Path, record: Mapping[str, Array]) -> None:
+    """Write the record as Parquet, one column each."""
+    import pyarrow
+    import pyarrow.parquet
+
+    with path.open("wb") as file:  # given a name, pyarrow would expand ~ and read it as a URI
+        pyarrow.parquet.write_table(pyarrow.table(dict(record)), file)
+
+
+def _exchange(stage: Path, path: Path) -> None:
+    """Rename stage to path; what is there goes aside first, and is deleted last."""
+    if not path.exists():
+        stage.rename(path)
+        return
+    aside = Path(tempfile.mkdtemp(prefix=f".{path.name}.", suffix=".old", dir=path.parent))
+    old = aside / path.name
+    try:
+        path.rename(old)
+        try:
+            stage.rename(path)
+        except BaseException:  # also an interrupt: what was there comes back
+            if not path.exists():
+                old.rename(path)
+            raise
+    finally:
+        shutil.rmtree(aside, ignore_errors=True)

@@ -1,0 +1,79 @@
+"""The leg of a recording: every link where, as long and as thick as the record and the leg say."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from recorded import LEG, ellipse, read, written
+
+from fivebar_sim import kinematics
+from fivebar_sim.arrays import Array
+
+SINGLE = float(np.finfo(np.float32).eps)
+
+
+def turned(quaternions: list[Any], vector: tuple[float, float, float]) -> Array:
+    """Return a vector turned by quaternions (x, y, z, w), as v + 2 u x (u x v + w v)."""
+    quaternion = np.array(quaternions, dtype=np.float64).reshape(-1, 4)
+    u, w = quaternion[:, :3], quaternion[:, 3:]
+    return np.array(vector) + 2.0 * np.cross(u, np.cross(u, vector) + w * np.array(vector))
+
+
+def test_links_are_where_the_record_says(tmp_path: Path) -> None:
+    record = ellipse(LEG, 101)
+    moving, static = read(written(tmp_path / "a.rrd", LEG, record))
+    q = np.stack([record[f"theta_{joint}"] for joint in "ABED"], axis=-1)[::10]
+    p, (A, E) = kinematics.chain_points(LEG, q), kinematics.bases(LEG)
+    ends = {"L1": (A, p.B), "L2": (p.B, p.C_left), "L3": (p.D, p.C_right), "L4": (E, p.D)}
+    for name, (inner, outer) in ends.items():
+        pose, bar = moving[f"/hip/{name}"], static[f"/hip/{name}"]
+        origin = np.array(pose["Transform3D:translation"])[:, 0]
+        # a capsule lies along z of its own frame; that frame is turned within the link's
+        along = turned(bar["Capsules3D:quaternions"][0], (0.0, 0.0, 1.0))
+        local = along[0] * bar["Capsules3D:lengths"][0][0]
+        tip = origin + turned(pose["Transform3D:quaternion"], tuple(local))
+        for drawn, point in ((origin, inner), (tip, outer)):
+            # positions of 0.1 m and unit quaternions are each rounded to single precision
+            np.testing.assert_allclose(drawn[:, [0, 2]] - point, 0.0, atol=SINGLE)
+            np.testing.assert_allclose(drawn[:, 1], 0.0, atol=SINGLE)
+        across = turned(pose["Transform3D:quaternion"], (0.0, 1.0, 0.0))
+        np.testing.assert_allclose(across, np.broadcast_to((0.0, 1.0, 0.0), across.shape), atol=0)
+
+
+def test_foot_target_and_trail_are_where_the_record_says(tmp_path: Path) -> None:
+    record = ellipse(LEG, 101)
+    moving, static = read(written(tmp_path / "a.rrd", LEG, record))
+    foot = np.stack([record["foot_x"], record["foot_z"]], axis=-1)[::10]
+    target = np.stack([record["target_x"], record["target_z"]], axis=-1)
+    L2, ball = moving["/hip/L2"], static["/hip/L2/foot"]
+    offset = tuple(ball["Ellipsoids3D:centers"][0][0])
+    drawn = np.array(L2["Transform3D:translation"])[:, 0] + turned(
+        L2["Transform3D:quaternion"], offset
+    )
+    np.testing.assert_allclose(drawn[:, [0, 2]], foot, rtol=0, atol=SINGLE)
+    needle = np.array(moving["/hip/target"]["LineStrips3D:strips"])[:, 0]
+    np.testing.assert_allclose(needle.mean(axis=1)[:, [0, 2]], target[::10], rtol=0, atol=SINGLE)
+    path = np.array(static["/hip/target_path"]["LineStrips3D:strips"][0][0])
+    np.testing.assert_array_equal(path[:, [0, 2]], target.astype(np.float32))
+    trail = np.array(moving["/hip/foot_trail"]["LineStrips3D:strips"])[:, 0]
+    np.testing.assert_array_equal(trail[:, 1, [0, 2]], foot.astype(np.float32))
+    np.testing.assert_array_equal(trail[1:, 0], trail[:-1, 1])
+
+
+def test_links_are_as_long_and_thick_as_the_leg(tmp_path: Path) -> None:
+    _, static = read(written(tmp_path / "a.rrd", LEG, ellipse(LEG, 5)))
+    lengths = {"L1": [LEG.L1], "L2": [LEG.L2, LEG.L6], "L3": [LEG.L3], "L4": [LEG.L4]}
+    for name, length in (lengths | {"L5": [LEG.L5]}).items():
+        drawn = static[f"/hip/{name}"]["Capsules3D:lengths"]
+        np.testing.assert_array_equal(drawn[0], np.array(length, dtype=np.float32))
+    for name in lengths:
+        assert static[f"/hip/{name}"]["Capsules3D:radii"] == [[np.float32(LEG.radius)]]
+    # the extension starts at C and ends at the foot
+    L2, foot = static["/hip/L2"], static["/hip/L2/foot"]
+    start = np.array(L2["Capsules3D:translations"][0][1])
+    along = turned(L2["Capsules3D:quaternions"][0][1], (0.0, 0.0, 1.0))[0]
+    F = start + LEG.L6 * along - foot["Ellipsoids3D:centers"][0][0]
+    np.testing.assert_allclose(F[[0, 2]], 0.0, atol=SINGLE * LEG.L2)
+    assert foot["Ellipsoids3D:half_sizes"] == [[[np.float32(LEG.foot_radius)] * 3]]

@@ -1,0 +1,238 @@
+"""Run directories: complete, exact and whole, or not there at all; nothing of others is touched."""
+
+from __future__ import annotations
+
+import errno
+import json
+import math
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, NoReturn
+
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+
+from fivebar_sim import recording, rollout, run_directory
+from fivebar_sim.errors import RunDirectoryError
+from fivebar_sim.rollout import Result
+from fivebar_sim.run_directory import FILES
+from fivebar_sim.scenario import Scenario
+
+COLUMNS = (
+    "time target_x target_z foot_x foot_z theta_A theta_B theta_E theta_D theta_dot_A theta_dot_B "
+    "theta_dot_E theta_dot_D ctrl_A ctrl_E torque_A torque_E gap"
+).split()
+MEASURED = [
+    *("tracking.rms", "tracking.max", "closure.rms", "closure.max"),
+    *("load.torque_rms.A", "load.torque_rms.E", "load.torque_peak.A", "load.torque_peak.E"),
+    *("load.share_A", "load.thermal_share_A", "branch.working_mode", "branch.assembly"),
+    *("branch.flips", "warnings", "verdict"),
+]
+
+
+@pytest.fixture(scope="module")
+def result() -> Result:
+    settings = ["duration=0.751", "path.frequency=4", "limits={tracking={rms=1e-9}}"]
+    return rollout.run(Scenario.load("classic-ellipse", settings))
+
+
+def names(folder: Path) -> set[str]:
+    return {path.name for path in folder.iterdir()}
+
+
+def look_up(table: Mapping[str, Any], key: str) -> Any:
+    for part in key.split("."):
+        table = table[part]
+    return table
+
+
+def refuse_constant(name: str) -> NoReturn:
+    raise AssertionError(f"metrics.json says {name}")
+
+
+# law
+
+
+def test_run_directory_is_complete_and_alone(tmp_path: Path, result: Result) -> None:
+    where = result.write(tmp_path / "runs" / "deep" / "mine")
+    assert where == tmp_path / "runs" / "deep" / "mine"
+    assert names(where) == set(FILES)
+    assert names(where.parent) == {"mine"}
+    assert run_directory.is_run(where)
+    run_directory.check_run(where)
+    assert all((where / name).stat().st_size > 0 for name in FILES)
+
+
+def test_parquet_is_the_record(tmp_path: Path, result: Result) -> None:
+    table = pq.read_table(result.write(tmp_path / "mine") / "rollout.parquet")
+    assert table.column_names == COLUMNS
+    assert {str(field.type) for field in table.schema} == {"double"}
+    assert table.num_rows == result.scenario.steps == 751
+    for name in COLUMNS:
+        column = table[name].to_numpy()
+        np.testing.assert_array_equal(column, result.record[name])
+        assert np.isfinite(column).all()
+    # computed, not summed up: bit for bit
+    np.testing.assert_array_equal(table["time"].to_numpy(), (np.arange(751) + 1) * 0.001)
+
+
+def test_metrics_are_strict_json_and_say_where_they_come_from(
+    tmp_path: Path, result: Result
+) -> None:
+    text = (result.write(tmp_path / "mine") / "metrics.json").read_text(encoding="utf-8")
+    metrics = json.loads(text, parse_constant=refuse_constant)
+    assert metrics == json.loads(json.dumps(result.metrics))
+    for key in MEASURED:
+        assert look_up(metrics, key) is not None
+    assert metrics["verdict"] == result.verdict == "fail"
+    (limit,) = metrics["limits"]
+    assert (limit["key"], limit["low"], limit["high"]) == ("tracking.rms", None, 1e-9)
+    assert (limit["value"], limit["ok"]) == (metrics["tracking"]["rms"], False)
+    provenance = metrics["provenance"]
+    for key in ("fivebar_sim", "mujoco", "numpy", "python", "platform"):
+        assert isinstance(provenance[key], str)
+    settings = provenance["integrator"], provenance["timestep"], provenance["seed"]
+    assert settings == ("discrete", 0.001, 0)
+    assert "git" in provenance
+
+
+def test_run_of_a_run_is_the_same_run(tmp_path: Path) -> None:
+    first = rollout.run(Scenario.load("q8bot-trot", ["duration=2.1"]))
+    where = first.write(tmp_path / "trot")
+    assert names(where) == {*FILES, "q8bot_trot.csv"}
+    again = rollout.run(Scenario.load(where / "scenario.toml"))
+    for name in COLUMNS:
+        np.testing.assert_array_equal(again.record[name], first.record[name])
+    # in its own place, where the CSV is read from what is exchanged
+    again.write(where)
+    assert names(where) == {*FILES, "q8bot_trot.csv"}
+    assert names(tmp_path) == {"trot"}
+
+
+# edge
+
+
+def test_load_that_nobody_shares_is_null(tmp_path: Path) -> None:
+    settings = ["path.kind=line", "path.start=[0,-0.08]", "path.stop=[0,-0.08]"]
+    held = rollout.run(Scenario.load("classic-ellipse", [*settings, "leg.gravity=[0,0]"]))
+    text = (held.write(tmp_path / "mine") / "metrics.json").read_text(encoding="utf-8")
+    share = json.loads(text, parse_constant=refuse_constant)["load"]["share_A"]
+    assert share is None or math.isfinite(share)
+
+
+def test_existing_run_and_empty_directory_are_exchanged(tmp_path: Path, result: Result) -> None:
+    where = tmp_path / "mine"
+    where.mkdir()
+    result.write(where)
+    (where / "notes.txt").write_text("of the old run", encoding="utf-8")
+    before = os.stat(where).st_ino
+    result.write(where)
+    assert names(where) == set(FILES)
+    assert os.stat(where).st_ino != before
+    assert names(tmp_path) == {"mine"}
+
+
+def test_relative_and_odd_names_are_taken_literally(
+    tmp_path: Path, result: Result, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    for name in ("plain", "~", "~/mine", "s3:/bucket", "two words", "é"):
+        run_directory.check_run(result.write(name))
+    assert names(tmp_path) == {"plain", "~", "s3:", "two words", "é"}
+
+
+# refusal
+
+
+def test_what_is_not_ours_is_refused_and_untouched(tmp_path: Path, result: Result) -> None:
+    (tmp_path / "file").write_text("precious", encoding="utf-8")
+    (tmp_path / "folder").mkdir()
+    (tmp_path / "folder" / "metrics.json").write_text("precious", encoding="utf-8")
+    (tmp_path / "dangling").symlink_to(tmp_path / "nowhere")
+    before = names(tmp_path)
+    for name in ("file", "folder", "dangling"):
+        with pytest.raises(RunDirectoryError) as caught:
+            result.write(tmp_path / name)
+        what = "something that is no run directory is there"
+        assert str(caught.value) == f"cannot write {tmp_path / name}: {what}"
+        assert isinstance(caught.value, OSError)
+    assert names(tmp_path) == before
+    assert (tmp_path / "file").read_text(encoding="utf-8") == "precious"
+    assert names(tmp_path / "folder") == {"metrics.json"}
+
+
+def test_place_that_cannot_be_is_refused(tmp_path: Path, result: Result) -> None:
+    (tmp_path / "file").touch()
+    for name, message in {
+        "file/mine": f"{tmp_path / 'file'} is not a directory one may write in",
+        "x" * 300: "File name too long",
+        f"{'x' * 300}/mine": "File name too long",
+    }.items():
+        with pytest.raises(RunDirectoryError) as caught:
+            result.write(tmp_path / name)
+        assert str(caught.value) == f"cannot write {tmp_path / name}: {message}"
+    assert names(tmp_path) == {"file"}
+
+
+def test_place_that_may_not_be_written_is_refused(
+    tmp_path: Path, result: Result, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # root may write anywhere, so the answer of the system is replaced
+    monkeypatch.setattr("os.access", lambda path, mode: False)
+    with pytest.raises(RunDirectoryError, match=r"is not a directory one may write in$"):
+        result.write(tmp_path / "mine")
+    assert not names(tmp_path)
+
+
+@pytest.mark.parametrize("there", [False, True])
+def test_full_disk_leaves_what_was_there(
+    tmp_path: Path, result: Result, monkeypatch: pytest.MonkeyPatch, there: bool
+) -> None:
+    where = tmp_path / "mine"
+    if there:
+        result.write(where)
+        (where / "notes.txt").touch()
+
+    def full(*args: object) -> NoReturn:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(recording, "write", full)
+    with pytest.raises(RunDirectoryError) as caught:
+        result.write(where)
+    assert str(caught.value) == f"cannot write {where}: No space left on device"
+    assert names(tmp_path) == ({"mine"} if there else set())
+    assert not there or names(where) == {*FILES, "notes.txt"}
+
+
+@pytest.mark.parametrize("error", [KeyboardInterrupt, OSError(errno.EIO, "Input/output error")])
+def test_interrupt_between_the_renames_brings_the_old_run_back(
+    tmp_path: Path, result: Result, monkeypatch: pytest.MonkeyPatch, error: Any
+) -> None:
+    where = result.write(tmp_path / "mine")
+    (where / "notes.txt").touch()
+    rename = Path.rename
+
+    def broken(self: Path, target: Path) -> Path:
+        if self.name.endswith(".partial"):
+            raise error
+        return rename(self, target)
+
+    monkeypatch.setattr(Path, "rename", broken)
+    with pytest.raises((KeyboardInterrupt, RunDirectoryError)):
+        result.write(where)
+    assert names(where) == {*FILES, "notes.txt"}
+    assert names(tmp_path) == {"mine"}
+
+
+@pytest.mark.parametrize("missing", FILES)
+def test_incomplete_run_is_none(tmp_path: Path, result: Result, missing: str) -> None:
+    where = result.write(tmp_path / "mine")
+    (where / missing).unlink()
+    assert not run_directory.is_run(where)
+    with pytest.raises(RunDirectoryError) as caught:
+        run_directory.check_run(where)
+    assert str(caught.value) == f"{where} is no run directory: it lacks {missing}"
+    with pytest.raises(RunDirectoryError, match=r"no such directory$"):
+        run_directory.check_run(tmp_path / "nowhere")
