@@ -1,0 +1,98 @@
+"""What people read of a run: tables in mm, um, mN m and percent."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from rich import box
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+
+from fivebar_sim.metrics import Limit, look_up
+
+if TYPE_CHECKING:
+    from fivebar_sim.rollout import Result
+
+SHOWN = {
+    "tracking.rms": ("tracking RMS", 1e3, "mm"),
+    "tracking.max": ("tracking max", 1e3, "mm"),
+    "closure.rms": ("loop gap RMS", 1e6, "um"),
+    "closure.max": ("loop gap max", 1e6, "um"),
+    "load.torque_rms.A": ("torque A RMS", 1e3, "mN m"),
+    "load.torque_rms.E": ("torque E RMS", 1e3, "mN m"),
+    "load.torque_peak.A": ("torque A peak", 1e3, "mN m"),
+    "load.torque_peak.E": ("torque E peak", 1e3, "mN m"),
+    "load.share_A": ("load share A", 1e2, "%"),
+    "load.thermal_share_A": ("thermal share A", 1e2, "%"),
+    "branch.flips": ("branch flips", 1.0, ""),
+    "warnings": ("MuJoCo warnings", 1.0, ""),
+}
+"""What a metric is called, the factor from SI to the shown unit, and that unit."""
+
+
+def shown(key: str, value: float | None) -> str:
+    """Return a metric's value in the unit that people read."""
+    _, scale, unit = SHOWN[key]
+    if value is None:
+        return "undefined"
+    return f"{scale * value:.4g} {unit}".strip()
+
+
+def bounds(limit: Limit) -> str:
+    """Return a limit in the unit that people read: "<= 1.3 mm", "40 to 60 %"."""
+    if limit.low == -math.inf:
+        return f"<= {shown(limit.key, limit.high)}"
+    scale = SHOWN[limit.key][1]
+    return f"{scale * limit.low:.4g} to {shown(limit.key, limit.high)}"
+
+
+def verdict(ok: bool) -> str:
+    """Return the word for a verdict, coloured for a terminal."""
+    return "[green]pass[/green]" if ok else "[red]FAIL[/red]"
+
+
+def print_result(result: Result, where: str, console: Console) -> None:
+    """Print one run: every metric, its limit where it has one, the verdict, and where it lies."""
+    limits = {limit.key: limit for limit in result.limits}
+    title = f"{result.scenario.name}: {result.scenario.leg.name} leg"
+    table = _table(escape(title), ("metric", "value", "limit", "verdict"))
+    for key, (label, _, _) in SHOWN.items():
+        limit = limits.get(key)
+        judged = (bounds(limit), verdict(limit.ok)) if limit else ("", "")
+        table.add_row(label, shown(key, look_up(result.metrics, key)), *judged)
+    console.print(table)
+    flip = result.metrics["branch"]["first_flip"]
+    if flip is not None:
+        console.print(f"[red]the leg left its branch at t = {flip:g} s[/red]")
+    console.print(
+        f"verdict: {verdict(result.verdict == 'pass')}   written to {escape(where)}", soft_wrap=True
+    )
+
+
+def print_check(results: Sequence[Result], console: Console) -> None:
+    """Print the limits of many runs as one table."""
+    title = "foot tracking and load against their limits"
+    table = _table(title, ("scenario", "metric", "limit", "now", "verdict"))
+    for result in results:
+        name = escape(result.scenario.name)
+        for limit in result.limits:
+            label, now = SHOWN[limit.key][0], shown(limit.key, limit.value)
+            table.add_row(name, label, bounds(limit), now, verdict(limit.ok))
+        flips = result.metrics["branch"]["flips"]
+        if flips:
+            table.add_row(name, "branch flips", "none", str(flips), verdict(False))
+        if not result.limits and not flips:
+            table.add_row(name, "no limits set", "", "", verdict(True))
+    console.print(table)
+
+
+def _table(title: str, columns: Sequence[str]) -> Table:
+    """Return an empty table; numbers stand to the right, and nothing wraps at 80 columns."""
+    table = Table(title=title, box=box.SIMPLE_HEAD, title_justify="left", padding=(0, 1, 0, 0))
+    for column in columns:
+        number = column in ("value", "limit", "now")
+        table.add_column(column, justify="right" if number else "left", no_wrap=True)
+    return table

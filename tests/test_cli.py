@@ -1,0 +1,278 @@
+"""The command `fivebar`, called as a function: exit status, one clear line, and what is left."""
+
+from __future__ import annotations
+
+import errno
+import json
+from pathlib import Path
+from typing import NamedTuple, NoReturn
+
+import pytest
+
+from fivebar_sim import cli, recording
+from fivebar_sim.run_directory import FILES
+
+ELLIPSE = """
+name = "short"
+duration = 0.6
+[path]
+kind = "ellipse"
+centre = [0.0, -0.072]
+radii = [0.02, 0.008]
+frequency = 4.0
+ramp = 0.1
+"""
+CSV = "time_s,x_mm,z_mm\n0,0,-80\n0.2,10,-75\n0.4,0,-70\n0.6,-10,-75\n"
+FROM_CSV = ["--set", "path.kind=csv", "--set", "path.file=foot.csv"]
+DIVERGING = ["--set", "sim.integrator=implicitfast", "--set", "sim.timestep=0.02"]
+
+
+class Said(NamedTuple):
+    """What a command came to."""
+
+    status: int
+    out: str
+    err: str
+
+
+class Shell:
+    """Runs commands in a folder that holds short.toml, within this process."""
+
+    def __init__(self, folder: Path, capture: pytest.CaptureFixture[str]) -> None:
+        self.folder, self.capture = folder, capture
+
+    def __call__(self, *args: str) -> Said:
+        """Return what a command came to."""
+        self.capture.readouterr()
+        status = cli.main(args)
+        out, err = self.capture.readouterr()
+        return Said(status, out, err)
+
+    def names(self) -> set[str]:
+        """Return everything in the folder."""
+        return {str(path.relative_to(self.folder)) for path in self.folder.rglob("*")}
+
+    def refused(self, *args: str, status: int = 2) -> str:
+        """Return the one line on stderr of a command that changes nothing."""
+        before = self.names()
+        said = self(*args)
+        assert (said.status, said.out) == (status, "")
+        assert said.err.startswith("fivebar: ")
+        assert said.err.endswith("\n")
+        assert said.err.count("\n") == 1
+        assert self.names() == before
+        return said.err.removeprefix("fivebar: ").rstrip("\n")
+
+
+@pytest.fixture
+def shell(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> Shell:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "short.toml").write_text(ELLIPSE, encoding="utf-8")
+    (tmp_path / "foot.csv").write_text(CSV, encoding="utf-8")
+    return Shell(tmp_path, capsys)
+
+
+# law
+
+
+def test_run_shows_a_table_and_writes_where_it_says(shell: Shell) -> None:
+    said = shell("run", "short.toml", "--out", "mine")
+    assert (said.status, said.err) == (0, "")
+    assert "short: classic leg" in said.out
+    assert "MuJoCo warnings" in said.out
+    assert said.out.endswith("written to mine\n")
+    assert {f"mine/{name}" for name in FILES} <= shell.names()
+    assert shell("run", "short.toml").out.endswith(f"written to {Path('runs') / 'short'}\n")
+
+
+def test_json_is_the_metrics(shell: Shell) -> None:
+    said = shell("run", "short.toml", "--out", "mine", "--json")
+    assert json.loads(said.out) == json.loads(Path("mine/metrics.json").read_text("utf-8"))
+    both = shell("run", "short.toml", "classic-ellipse", "--set", "duration=0.8", "--json")
+    assert set(json.loads(both.out)) == {"short", "classic-ellipse"}
+    assert (said.err, both.err) == ("", "")
+
+
+def test_quiet_prints_nothing(shell: Shell) -> None:
+    assert shell("run", "short.toml", "--quiet") == (0, "", "")
+    assert shell("check", "short.toml", "--quiet") == (0, "", "")
+    fails = ["--set", "limits.tracking.rms=0", "--quiet"]
+    assert shell("run", "short.toml", *fails) == (1, "", "")
+
+
+def test_several_scenarios_go_into_a_folder(shell: Shell) -> None:
+    said = shell("run", "short.toml", "classic-ellipse", "--set", "duration=0.8", "--out", "all")
+    assert said.status == 0
+    for name in ("short", "classic-ellipse"):
+        assert {f"all/{name}/{file}" for file in FILES} <= shell.names()
+        assert f"written to {Path('all') / name}" in said.out
+
+
+def test_settings_repeat_and_reach_every_scenario(shell: Shell) -> None:
+    settings = ["--set", "leg.L2=0.07", "--set", "path.kind=circle", "--set", "path.radius=0.01"]
+    assert shell("run", "short.toml", *settings, "--out", "mine", "--quiet").status == 0
+    resolved = Path("mine/scenario.toml").read_text("utf-8")
+    for line in ("L2 = 0.07", 'kind = "circle"', "radius = 0.01", "frequency = 4.0"):
+        assert line in resolved
+
+
+def test_failing_limit_exits_1_and_still_writes(shell: Shell) -> None:
+    fails = ["--set", "limits.tracking.rms=1e-9"]
+    said = shell("run", "short.toml", *fails, "--out", "mine")
+    assert said.status == 1
+    assert "FAIL" in said.out
+    assert json.loads(Path("mine/metrics.json").read_text("utf-8"))["verdict"] == "fail"
+    checked = shell("check", "short.toml", *fails)
+    assert (checked.status, checked.err) == (1, "")
+    assert "FAIL" in checked.out
+
+
+def test_check_shows_every_limit_and_writes_nothing(shell: Shell) -> None:
+    before = shell.names()
+    said = shell("check")
+    assert said.status == 0
+    for name in ("classic-ellipse", "classic-figure-eight", "q8bot-trot"):
+        assert name in said.out
+    assert "pass" in said.out
+    assert "FAIL" not in said.out
+    assert shell.names() == before
+    assert "no limits set" in shell("check", "short.toml").out
+
+
+def test_highest_status_counts(shell: Shell) -> None:
+    Path("wild.toml").write_text(
+        ELLIPSE.replace("short", "wild") + "[sim]\nintegrator='implicitfast'\ntimestep=0.02\n",
+        encoding="utf-8",
+    )
+    said = shell("run", "wild.toml", "short.toml", "--out", "all")
+    assert said.status == 1
+    assert said.err.startswith("fivebar: wild: the simulation broke down at t = ")
+    assert {name for name in shell.names() if name.startswith("all/")} == {
+        *("all/short", *(f"all/short/{file}" for file in FILES))
+    }
+    assert shell("check", "wild.toml", "short.toml", "--quiet").status == 1
+    # a wrong input is found before the first one runs
+    Path("wrong.toml").write_text("[path]\nkind = 'line'\n", encoding="utf-8")
+    assert "path.frequency is missing" in shell.refused("run", "short.toml", "wrong.toml")
+
+
+@pytest.mark.parametrize("text", [CSV, "\ufeff" + CSV.replace("\n", "\r\n")])
+def test_csv_drives_the_leg(shell: Shell, text: str) -> None:
+    Path("foot.csv").write_bytes(text.encode())
+    assert shell("run", "short.toml", *FROM_CSV, "--out", "mine", "--quiet") == (0, "", "")
+    assert Path("mine/foot.csv").read_bytes() == text.encode()
+
+
+def test_markup_in_names_is_shown_as_it_is(shell: Shell) -> None:
+    said = shell("run", "short.toml", "--set", "leg.name='[/red]'", "--out", "[/red]")
+    assert said.status == 0
+    assert "short: [/red] leg" in said.out
+    assert said.out.endswith("written to [/red]\n")
+    assert "[red]" in shell("check", "short.toml", "--set", "name='[red]'").out
+
+
+# refusal
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        (
+            "path.centre=[0,-0.1]",
+            "short.toml: path out of reach at t = 0 s: the foot at (0.00, -108.00) mm is "
+            "9.13 mm out; the nearest reachable point is (0.00, -98.87) mm",
+        ),
+        ("duratoin=1", "short.toml: unknown key 'duratoin'; known: "),
+        ("servo.kp='stiff'", "short.toml: servo.kp must be a number, got 'stiff'"),
+        ("leg.L1=0", "short.toml: [leg]: L1 must be in (0, 1000) m, got 0"),
+        ("leg.L3=-0.06", "short.toml: [leg]: L3 must be in (0, 1000) m, got -0.06"),
+        ("leg.L5=1", "short.toml: [leg]: L5: the links can never close"),
+        ("leg=doggo", "short.toml: leg.preset: unknown leg preset 'doggo'; known: classic, q8bot"),
+        ("path.kind=square", "short.toml: path.kind: unknown path 'square'; known: circle, csv,"),
+        ("controller.name=pid", "short.toml: controller.name: unknown controller 'pid'; known: s"),
+        ("nonsense", "--set takes KEY=VALUE, got 'nonsense'"),
+        ("name=a\tb", "short.toml: name must be a plain file name of 1 to 200 bytes, got 'a\\tb'"),
+    ],
+)
+def test_wrong_input_is_one_line(shell: Shell, settings: str, message: str) -> None:
+    for command in ("run", "check"):
+        assert shell.refused(command, "short.toml", "--set", settings).startswith(message)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("time_s,x_mm\n0,0\n", ", line 1: no column 'z_mm'; the header must be"),
+        (
+            CSV.replace("10,-75", "nan,-75", 1),
+            ", line 3: x_mm must be a number in [-1e+06",
+        ),
+        (CSV.replace("0.4", "0.1"), ", line 4: times are not sorted: time_s must be > 0.2 s"),
+        (CSV.replace("0.4", "0.2"), ", line 4: times are repeated: time_s must be > 0.2 s"),
+        (CSV[:25], ": a path needs at least 2 rows"),
+    ],
+)
+def test_wrong_csv_is_one_line(shell: Shell, text: str, message: str) -> None:
+    Path("foot.csv").write_text(text, encoding="utf-8")
+    said = shell.refused("run", "short.toml", *FROM_CSV)
+    assert said.startswith(f"{shell.folder / 'foot.csv'}{message}")
+
+
+def test_diverging_timestep_exits_1_and_leaves_nothing(shell: Shell) -> None:
+    said = shell.refused("run", "short.toml", *DIVERGING, "--quiet", status=1)
+    assert said.startswith("short: the simulation broke down at t = 0.1 s: ")
+    assert "try a timestep below 0.02 s" in said
+
+
+def test_place_that_cannot_be_written_is_one_line(shell: Shell) -> None:
+    Path("precious").mkdir()
+    Path("precious/notes.txt").touch()
+    taken = "something that is no run directory is there"
+    for place, message in {
+        "precious": f"cannot write precious: {taken}",
+        "short.toml": f"cannot write short.toml: {taken}",
+        ".": f"cannot write .: {taken}",
+        "short.toml/x": f"cannot write short.toml/x: {shell.folder / 'short.toml'} is not a dir",
+        "x" * 300: f"cannot write {'x' * 300}: File name too long",
+        "": "--out must name a directory, got ''",
+    }.items():
+        assert shell.refused("run", "short.toml", "--out", place).startswith(message)
+
+
+def test_two_scenarios_of_one_name_are_refused(shell: Shell) -> None:
+    message = "two scenarios are called 'short' and would write to one place"
+    assert shell.refused("run", "short.toml", "short.toml") == message
+
+
+def test_replay_of_no_run_is_one_line(shell: Shell) -> None:
+    lacks = "it lacks scenario.toml, metrics.json, rollout.parquet, recording.rrd"
+    assert shell.refused("replay", ".") == f". is no run directory: {lacks}"
+    assert shell.refused("replay", "no") == "no is no run directory: no such directory"
+    assert "File name too long" in shell.refused("replay", "x" * 300)
+
+
+@pytest.mark.parametrize("error", [KeyboardInterrupt(), OSError(errno.ENOSPC, "No space left")])
+def test_trouble_while_writing_leaves_the_old_run(
+    shell: Shell, monkeypatch: pytest.MonkeyPatch, error: BaseException
+) -> None:
+    assert shell("run", "short.toml", "--out", "mine").status == 0
+    before = Path("mine/metrics.json").stat().st_ino
+
+    def broken(*args: object) -> NoReturn:
+        raise error
+
+    monkeypatch.setattr(recording, "write", broken)
+    interrupted = isinstance(error, KeyboardInterrupt)
+    said = shell.refused("run", "short.toml", "--out", "mine", status=130 if interrupted else 2)
+    assert said == ("interrupted" if interrupted else "cannot write mine: No space left")
+    assert Path("mine/metrics.json").stat().st_ino == before
+
+
+@pytest.mark.parametrize("args", [[], ["walk"], ["run", "--fast"], ["run", "--out"], ["replay"]])
+def test_usage_errors_exit_2(shell: Shell, args: list[str]) -> None:
+    with pytest.raises(SystemExit) as caught:
+        shell(*args)
+    assert caught.value.code == 2
+    assert "Traceback" not in shell.capture.readouterr().err

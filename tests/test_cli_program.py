@@ -1,0 +1,103 @@
+"""The command `fivebar` as a program: its status and output, its start, and what interrupts it."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from fivebar_sim import __version__
+
+ELLIPSE = """
+duration = 0.6
+[path]
+kind = "ellipse"
+centre = [0.0, -0.072]
+radii = [0.02, 0.008]
+frequency = 4.0
+ramp = 0.1
+"""
+DIVERGING = ["--set", "sim.integrator=implicitfast", "--set", "sim.timestep=0.02"]
+FIVEBAR = str(Path(sys.executable).with_name("fivebar"))
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "short.toml").write_text(ELLIPSE, encoding="utf-8")
+    return tmp_path
+
+
+def names(folder: Path) -> set[str]:
+    return {str(path.relative_to(folder)) for path in folder.rglob("*")}
+
+
+def program(*args: str, **more: str) -> tuple[int, str, str]:
+    """Return status, stdout and stderr of a command."""
+    done = subprocess.run([FIVEBAR, *args], capture_output=True, text=True, env=os.environ | more)
+    return done.returncode, done.stdout, done.stderr
+
+
+def test_program_runs_and_fails_as_its_function_does(folder: Path) -> None:
+    assert program("--version") == (0, f"fivebar-sim {__version__}\n", "")
+    assert program("run", "short.toml", "--out", "mine", "--quiet") == (0, "", "")
+    before = names(folder)
+    for args, status in ((["--set", "leg.L1=0"], 2), (DIVERGING, 1)):
+        came, out, err = program("run", "short.toml", *args)
+        assert (came, out, err.count("\n")) == (status, "", 1)
+    assert names(folder) == before  # no run directory, and no log of MuJoCo's
+
+
+def test_output_suits_its_reader(folder: Path) -> None:
+    odd = ["run", "short.toml", "--set", "leg.name=é", "--out", "mine"]
+    status, out, err = program(*odd, PYTHONIOENCODING="ascii")
+    assert (status, err) == (0, "")
+    assert "short: \\xe9 leg" in out
+    for command in (["run", "short.toml", "--json"], ["check", "short.toml"]):
+        with subprocess.Popen(
+            [FIVEBAR, *command], stdout=subprocess.PIPE, stderr=subprocess.PIPE
+        ) as process:
+            assert process.stdout is not None
+            process.stdout.close()  # as head does when it has enough
+            assert process.stderr is not None
+            assert process.stderr.read() == b""
+        assert process.returncode == 141
+
+
+@pytest.mark.parametrize("args", [["--help"], ["run", "--help"], ["--version"]])
+def test_help_is_quick(args: list[str]) -> None:
+    code = f"""
+import sys
+from fivebar_sim.cli import main
+try:
+    main({args})
+except SystemExit as end:
+    assert not end.code
+slow = {{"rerun", "dm_control", "matplotlib", "mujoco", "scipy", "pyarrow"}}
+print("slow:", sorted(slow & set(sys.modules)))
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.endswith("slow: []\n")
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows sends no SIGINT to one process")
+def test_interrupt_exits_130_and_leaves_nothing(folder: Path) -> None:
+    code = "from fivebar_sim.cli import main; print(1, flush=True); raise SystemExit(main())"
+    before = names(folder)
+    long = ["run", "short.toml", "--set", "duration=1000", "--quiet"]
+    with subprocess.Popen(
+        [sys.executable, "-c", code, *long], stdout=subprocess.PIPE, stderr=subprocess.PIPE
+    ) as process:
+        assert process.stdout is not None
+        process.stdout.readline()
+        time.sleep(1.0)  # a run of this length takes more than five times that
+        process.send_signal(signal.SIGINT)
+        assert process.stderr is not None
+        assert process.stderr.read() == b"fivebar: interrupted\n"
+    assert process.returncode == 130
+    assert names(folder) == before
