@@ -231,6 +231,16 @@ def test_nearest_solution_over_the_half_turn_and_the_tie() -> None:
     np.testing.assert_allclose(near, (0.0, -math.pi), rtol=0, atol=1e-15)  # not +pi: 0.1 away
 
 
+def test_minus_pi_is_never_returned() -> None:
+    leg = FiveBar(0.25, 0.5, 0.5, 0.25, 0.0)
+    for z in (0.0, -0.0, -1e-20, -1e-300):
+        for theta in kinematics.inverse_all(leg, (-0.75, z)):
+            np.testing.assert_array_equal(theta, [np.pi, np.pi])
+    folded = FiveBar(0.05, 0.05, 0.05, 0.05, 0.0)
+    for zeros in ((0.0, 0.0), (-0.0, 0.0), (0.0, -0.0), (-0.0, -0.0)):
+        np.testing.assert_array_equal(kinematics.inverse(folded, zeros), [0.0, 0.0])
+
+
 # refusal
 
 

@@ -30,7 +30,13 @@ def dot(a: Array, b: Array) -> Array:
 
 def angle_between(a: Array, b: Array) -> Array:
     """Return the angle from a to b, anticlockwise, in (-pi, pi] [rad], shape (...)."""
-    return np.arctan2(cross(a, b) + 0.0, dot(a, b))  # + 0.0: -0.0 would give -pi
+    return direction(cross(a, b), dot(a, b))
+
+
+def direction(z: Array, x: Array) -> Array:
+    """Return the direction of (x, z) in (-pi, pi] [rad], 0 where both are zero of either sign."""
+    angle = np.arctan2(z + 0.0, x + 0.0)  # -0.0 + 0.0 is 0.0
+    return np.where(angle == -np.pi, np.pi, angle)  # what a tiny negative z is rounded to
 
 
 def wrap(angle: Array) -> Array:
