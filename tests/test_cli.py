@@ -189,7 +189,7 @@ def test_markup_in_names_is_shown_as_it_is(shell: Shell) -> None:
         ("leg.L1=0", "short.toml: [leg]: L1 must be in (0, 1000) m, got 0"),
         ("leg.L3=-0.06", "short.toml: [leg]: L3 must be in (0, 1000) m, got -0.06"),
         ("leg.L5=1", "short.toml: [leg]: L5: the links can never close"),
-        ("leg=doggo", "short.toml: leg.preset: unknown leg preset 'doggo'; known: classic, q8bot"),
+        ("leg=dogg", "short.toml: leg.preset: unknown leg preset 'dogg'; known: airhockey, classic"),
         ("path.kind=square", "short.toml: path.kind: unknown path 'square'; known: circle, csv,"),
         ("controller.name=pid", "short.toml: controller.name: unknown controller 'pid'; known: s"),
         ("nonsense", "--set takes KEY=VALUE, got 'nonsense'"),

@@ -11,16 +11,8 @@ from fivebar_sim.errors import ArgumentError
 from fivebar_sim.geometry import FiveBar
 from fivebar_sim.servo import Servo
 
-ODD = FiveBar(L1=0.035, L2=0.06, L3=0.055, L4=0.045, L5=0.03, L6=0.02, bend=0.4, tilt=0.3)
-UPRIGHT = FiveBar(
-    L1=0.335, L2=0.6025, L3=0.6025, L4=0.335, L5=0.4925, mode=(1, -1), assembly=1,
-    mass=(0.048, 0.124, 0.124, 0.048), com=(0.163, 0.45, 0.45, 0.163), gravity=(0.0, 0.0),
-)  # fmt: skip
-LEGS = {
-    **{name: FiveBar.load(name) for name in resources.shipped("models/legs")},
-    "odd": ODD,
-    "upright": UPRIGHT,
-}
+LEGS = {name: FiveBar.load(name) for name in resources.shipped("models/legs")}
+ODD = LEGS["extended"]
 FILE = resources.folder("models") / "leg.xml"
 
 
