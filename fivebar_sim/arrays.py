@@ -21,20 +21,52 @@ def at(index: tuple[int, ...]) -> str:
     return f" at index {index}" if index else ""
 
 
-def as_pairs(values: ArrayLike, name: str) -> Array:
-    """Return values as float64 pairs, shape (..., 2).
+def as_vectors(values: ArrayLike, name: str, size: int) -> Array:
+    """Return values as float64 vectors, shape (..., size).
 
     Args:
-        values: Points (x, z) or angle pairs.
+        values: Points, or tuples of angles.
         name: What the argument is called, for the message.
+        size: Length of the last axis.
 
     Raises:
-        ArgumentError: Unless the values are numbers of shape (..., 2).
+        ArgumentError: Unless the values are numbers of shape (..., size).
     """
     try:
-        pairs = np.asarray(values, dtype=np.float64)
+        vectors = np.asarray(values, dtype=np.float64)
     except (TypeError, ValueError) as error:
-        raise ArgumentError(f"{name} must be numbers of shape (..., 2): {error}") from None
-    if pairs.ndim == 0 or pairs.shape[-1] != 2:
-        raise ArgumentError(f"{name} must have shape (..., 2), got {pairs.shape}")
-    return pairs
+        raise ArgumentError(f"{name} must be numbers of shape (..., {size}): {error}") from None
+    if vectors.ndim == 0 or vectors.shape[-1] != size:
+        raise ArgumentError(f"{name} must have shape (..., {size}), got {vectors.shape}")
+    return vectors
+
+
+def as_pairs(values: ArrayLike, name: str) -> Array:
+    """Return values as float64 pairs, shape (..., 2); see `as_vectors`."""
+    return as_vectors(values, name, 2)
+
+
+def finite(values: Array, name: str) -> Array:
+    """Return the values.
+
+    Raises:
+        ArgumentError: Unless all are finite; says where.
+    """
+    good = np.isfinite(values)
+    if not good.all():
+        raise ArgumentError(f"{name} must be finite{at(first_index(~good))}")
+    return values
+
+
+def together(**arrays: Array) -> list[Array]:
+    """Return the arrays broadcast to one shape.
+
+    Raises:
+        ArgumentError: If their shapes do not fit; says which came.
+    """
+    try:
+        return list(np.broadcast_arrays(*arrays.values()))
+    except ValueError:
+        shapes = " and ".join(str(array.shape) for array in arrays.values())
+        names = " and ".join(arrays)
+        raise ArgumentError(f"{names} must broadcast, got shapes {shapes}") from None

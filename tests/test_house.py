@@ -22,7 +22,7 @@ FILES = sorted(
     )
     for path in (ROOT / folder).glob(pattern)
 )
-PURE = ("geometry", "kinematics", "workspace", "paths")
+PURE = ("geometry", "kinematics", "workspace", "hip", "two_link", "paths")
 HEAVY = {"mujoco", "rerun", "matplotlib", "scipy"}
 
 

@@ -7,8 +7,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fivebar_sim.arrays import Array, as_pairs, at, first_index
-from fivebar_sim.errors import ArgumentError, SingularError
+from fivebar_sim.arrays import Array, as_pairs, at, finite, first_index, together
+from fivebar_sim.errors import SingularError
 from fivebar_sim.geometry import FiveBar, Mode
 from fivebar_sim.kinematics.closure import bases, closed_points
 from fivebar_sim.kinematics.planar import angle_between, cross, dot, perp, turned, unit
@@ -96,11 +96,14 @@ def joint_motion(
         SingularError: Where a side chain is straight or folded.
         ArgumentError: Shapes that do not broadcast, or rates that are not finite.
     """
-    F, F_dot, F_ddot = _same_shape(foot=foot, foot_dot=foot_dot, foot_ddot=foot_ddot)
+    F, F_dot, F_ddot = together(
+        foot=as_pairs(foot, "foot"),
+        foot_dot=finite(as_pairs(foot_dot, "foot_dot"), "foot_dot"),
+        foot_ddot=finite(as_pairs(foot_ddot, "foot_ddot"), "foot_ddot"),
+    )
     A, E = bases(leg)
     rho, phi = foot_radius_and_angle(leg)
     theta = inverse(leg, F, mode)
-
     AB = leg.L1 * unit(theta[..., 0])
     BF = F - A - AB
     A_dot, A_ddot = _side_motion(AB, BF, F_dot, F_ddot, "A, B and F are in line")
@@ -119,20 +122,6 @@ def joint_motion(
 
 
 Pair = tuple[Array, Array]
-
-
-def _same_shape(**pairs: ArrayLike) -> tuple[Array, ...]:
-    """Return pairs broadcast to one shape (..., 2); the rates among them must be finite."""
-    arrays = [as_pairs(values, name) for name, values in pairs.items()]
-    try:
-        arrays = np.broadcast_arrays(*arrays)
-    except ValueError:
-        shapes = ", ".join(f"{n} {a.shape}" for n, a in zip(pairs, arrays, strict=True))
-        raise ArgumentError(f"shapes must broadcast, got {shapes}") from None
-    for name, array in zip(pairs, arrays, strict=True):
-        if name != "foot" and not np.isfinite(array).all():
-            raise ArgumentError(f"{name} must be finite{at(first_index(~np.isfinite(array)))}")
-    return tuple(arrays)
 
 
 def _side_motion(r1: Array, r2: Array, v: Array, a: Array, where: str) -> tuple[Pair, Pair]:
