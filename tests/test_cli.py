@@ -5,73 +5,16 @@ from __future__ import annotations
 import errno
 import json
 from pathlib import Path
-from typing import NamedTuple, NoReturn
+from typing import NoReturn
 
 import pytest
+from shell import CSV, ELLIPSE, Shell
 
-from fivebar_sim import cli, recording
+from fivebar_sim import recording
 from fivebar_sim.run_directory import FILES
 
-ELLIPSE = """
-name = "short"
-duration = 0.6
-[path]
-kind = "ellipse"
-centre = [0.0, -0.072]
-radii = [0.02, 0.008]
-frequency = 4.0
-ramp = 0.1
-"""
-CSV = "time_s,x_mm,z_mm\n0,0,-80\n0.2,10,-75\n0.4,0,-70\n0.6,-10,-75\n"
 FROM_CSV = ["--set", "path.kind=csv", "--set", "path.file=foot.csv"]
 DIVERGING = ["--set", "sim.integrator=implicitfast", "--set", "sim.timestep=0.02"]
-
-
-class Said(NamedTuple):
-    """What a command came to."""
-
-    status: int
-    out: str
-    err: str
-
-
-class Shell:
-    """Runs commands in a folder that holds short.toml, within this process."""
-
-    def __init__(self, folder: Path, capture: pytest.CaptureFixture[str]) -> None:
-        self.folder, self.capture = folder, capture
-
-    def __call__(self, *args: str) -> Said:
-        """Return what a command came to."""
-        self.capture.readouterr()
-        status = cli.main(args)
-        out, err = self.capture.readouterr()
-        return Said(status, out, err)
-
-    def names(self) -> set[str]:
-        """Return everything in the folder."""
-        return {str(path.relative_to(self.folder)) for path in self.folder.rglob("*")}
-
-    def refused(self, *args: str, status: int = 2) -> str:
-        """Return the one line on stderr of a command that changes nothing."""
-        before = self.names()
-        said = self(*args)
-        assert (said.status, said.out) == (status, "")
-        assert said.err.startswith("fivebar: ")
-        assert said.err.endswith("\n")
-        assert said.err.count("\n") == 1
-        assert self.names() == before
-        return said.err.removeprefix("fivebar: ").rstrip("\n")
-
-
-@pytest.fixture
-def shell(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> Shell:
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "short.toml").write_text(ELLIPSE, encoding="utf-8")
-    (tmp_path / "foot.csv").write_text(CSV, encoding="utf-8")
-    return Shell(tmp_path, capsys)
 
 
 # law
@@ -189,7 +132,10 @@ def test_markup_in_names_is_shown_as_it_is(shell: Shell) -> None:
         ("leg.L1=0", "short.toml: [leg]: L1 must be in (0, 1000) m, got 0"),
         ("leg.L3=-0.06", "short.toml: [leg]: L3 must be in (0, 1000) m, got -0.06"),
         ("leg.L5=1", "short.toml: [leg]: L5: the links can never close"),
-        ("leg=dogg", "short.toml: leg.preset: unknown leg preset 'dogg'; known: airhockey, classic"),
+        (
+            "leg=dogg",
+            "short.toml: leg.preset: unknown leg preset 'dogg'; known: airhockey, classic",
+        ),
         ("path.kind=square", "short.toml: path.kind: unknown path 'square'; known: circle, csv,"),
         ("controller.name=pid", "short.toml: controller.name: unknown controller 'pid'; known: s"),
         ("nonsense", "--set takes KEY=VALUE, got 'nonsense'"),
@@ -244,13 +190,6 @@ def test_place_that_cannot_be_written_is_one_line(shell: Shell) -> None:
 def test_two_scenarios_of_one_name_are_refused(shell: Shell) -> None:
     message = "two scenarios are called 'short' and would write to one place"
     assert shell.refused("run", "short.toml", "short.toml") == message
-
-
-def test_replay_of_no_run_is_one_line(shell: Shell) -> None:
-    lacks = "it lacks scenario.toml, metrics.json, rollout.parquet, recording.rrd"
-    assert shell.refused("replay", ".") == f". is no run directory: {lacks}"
-    assert shell.refused("replay", "no") == "no is no run directory: no such directory"
-    assert "File name too long" in shell.refused("replay", "x" * 300)
 
 
 @pytest.mark.parametrize("error", [KeyboardInterrupt(), OSError(errno.ENOSPC, "No space left")])

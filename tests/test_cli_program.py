@@ -10,18 +10,10 @@ import time
 from pathlib import Path
 
 import pytest
+from shell import ELLIPSE
 
 from fivebar_sim import __version__
 
-ELLIPSE = """
-duration = 0.6
-[path]
-kind = "ellipse"
-centre = [0.0, -0.072]
-radii = [0.02, 0.008]
-frequency = 4.0
-ramp = 0.1
-"""
 DIVERGING = ["--set", "sim.integrator=implicitfast", "--set", "sim.timestep=0.02"]
 FIVEBAR = str(Path(sys.executable).with_name("fivebar"))
 
