@@ -15,6 +15,7 @@ from fivebar_sim.kinematics.closure import (
     knees,
     passive,
 )
+from fivebar_sim.kinematics.half_angle import inverse_half_angle, inverse_within
 from fivebar_sim.kinematics.home import home
 from fivebar_sim.kinematics.rates import JointMotion, jacobian, joint_motion
 from fivebar_sim.kinematics.reach import inverse, inverse_all, inverse_nearest
@@ -31,7 +32,9 @@ __all__ = [
     "home",
     "inverse",
     "inverse_all",
+    "inverse_half_angle",
     "inverse_nearest",
+    "inverse_within",
     "jacobian",
     "joint_motion",
     "knees",

@@ -79,7 +79,11 @@ def _solve(
     return (theta_A, theta_E), (ok_A, ok_E)
 
 
-def _solve_blocks(leg: FiveBar, foot: Array, mode: Mode) -> tuple[Array, Bools]:
+def solve(leg: FiveBar, foot: Array, mode: Mode) -> tuple[Array, Bools]:
+    """Return (theta_A, theta_E) of points, and where each side reaches: A to F, E to C.
+
+    Both (..., 2); angles of a side that does not reach mean nothing.
+    """
     flat = foot.reshape(-1, 2)
     theta, ok = np.empty(flat.shape), np.empty(flat.shape, dtype=bool)
     with np.errstate(over="ignore", invalid="ignore"):  # infinitely far is out of reach
@@ -110,17 +114,23 @@ def inverse(leg: FiveBar, foot: ArrayLike, mode: Mode | None = None) -> Array:
             <= |ED| + |DC| for every point; `.index` is the first that is not.
         ArgumentError: Unknown mode, or a shape other than (..., 2).
     """
-    mode = leg.mode if mode is None else mode
-    if mode not in MODES:
-        raise ArgumentError(f"mode must be one of {MODES}, got {mode!r}")
-    foot = as_pairs(foot, "foot")
-    theta, ok = _solve_blocks(leg, foot, mode)
+    mode, foot = working_mode(leg, mode), as_pairs(foot, "foot")
+    theta, ok = solve(leg, foot, mode)
     if not ok.all():
-        raise _unreachable(leg, foot, theta, ok)
+        raise out_of_reach(leg, foot, theta, ok)
     return theta
 
 
-def _unreachable(leg: FiveBar, foot: Array, theta: Array, ok: Bools) -> UnreachableError:
+def working_mode(leg: FiveBar, mode: Mode | None) -> Mode:
+    """Return a mode that was asked for, or the leg's own for None; ArgumentError if unknown."""
+    mode = leg.mode if mode is None else mode
+    if mode not in MODES:
+        raise ArgumentError(f"mode must be one of {MODES}, got {mode!r}")
+    return mode
+
+
+def out_of_reach(leg: FiveBar, foot: Array, theta: Array, ok: Bools) -> UnreachableError:
+    """Return the error for points and angles of which not all are ok, as `solve` gives them."""
     bad = np.logical_not(ok.all(axis=-1))
     index = first_index(bad)
     A, E = bases(leg)
@@ -154,7 +164,7 @@ def inverse_all(leg: FiveBar, foot: ArrayLike) -> Array:
     foot = as_pairs(foot, "foot")
     every = np.empty((*foot.shape[:-1], len(MODES), 2))
     for k, mode in enumerate(MODES):
-        theta, ok = _solve_blocks(leg, foot, mode)
+        theta, ok = solve(leg, foot, mode)
         every[..., k, :] = np.where(ok.all(axis=-1, keepdims=True), theta, np.nan)
     return every
 

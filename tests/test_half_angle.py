@@ -1,0 +1,297 @@
+"""The half-angle route against the law of cosines; special poses, refusals, joint limits."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from poses import BATCHES, RIGHT, RIGID, length, random_leg, sample
+
+from fivebar_sim import kinematics
+from fivebar_sim.arrays import Array
+from fivebar_sim.errors import ArgumentError, FiveBarError, UnreachableError
+from fivebar_sim.geometry import MODES, FiveBar
+from fivebar_sim.kinematics.half_angle import PUBLISHED_LIMITS, half_angle, principal
+from fivebar_sim.kinematics.planar import turned, unit, wrap
+from fivebar_sim.kinematics.reach import foot_radius_and_angle, side_angle
+
+EPS = float(np.finfo(float).eps)
+WIDE = ((-20.0, 20.0), (-20.0, 20.0))  # [rad]
+SOME = 8.0  # roundings, each at most u: measured 4 between the two routes
+
+
+def root(r: Array, near: float, far: float) -> Array:
+    """Return sqrt(a^2 + b^2 - c^2), which is four times the area of the side's triangle."""
+    d2 = length(r) ** 2
+    return np.sqrt(np.maximum(((near + far) ** 2 - d2) * (d2 - (near - far) ** 2), 0.0))
+
+
+def side_bound(r: Array, near: float, far: float, u: float) -> Array:
+    """Return how far two routes may be apart: u / root, and the root of rounding at its zeros."""
+    with np.errstate(divide="ignore"):
+        edge = np.sqrt(SOME * u / (near * length(r)))
+        return np.minimum(SOME * u / root(r, near, far), edge)
+
+
+def bound(leg: FiveBar, foot: Array, theta: Array) -> Array:
+    """Return how far the two routes may be apart at (theta_A, theta_E)."""
+    A, E = kinematics.bases(leg)
+    rho, phi = foot_radius_and_angle(leg)
+    bound_A = side_bound(foot - A, leg.L1, rho, EPS * (leg.L1 + rho + leg.L5) ** 2)
+    B = A + leg.L1 * unit(theta[..., 0])
+    C = B + (leg.L2 / rho) * turned(foot - B, -phi) if leg.L6 > 0.0 else foot
+    bound_E = side_bound(C - E, leg.L4, leg.L3, EPS * (leg.L4 + leg.L3 + leg.L5) ** 2)
+    if leg.L6 > 0.0:  # C moves with B on side A; E's angle by 2 L3 / root for each metre of C
+        off = leg.L1 * (1.0 + leg.L2 / rho) * bound_A
+        bound_E = bound_E + 2.0 * leg.L3 * off / root(C - E, leg.L4, leg.L3)
+    return np.stack([bound_A, bound_E], axis=-1)
+
+
+# law
+
+
+def test_two_routes_agree_over_a_million_points() -> None:
+    """1000 legs, 1000 points each, all four modes; 1.2 10^6 poses are reachable."""
+    rng, seen, worst = np.random.default_rng(5), 0, 0.0
+    for _ in range(1000):
+        leg = random_leg(rng)
+        foot = rng.uniform(-1.0, 1.0, (1000, 2)) * leg.size
+        every = kinematics.inverse_all(leg, foot)
+        for k, mode in enumerate(MODES):
+            ok = np.isfinite(every[:, k, 0])
+            p, theta = foot[ok], every[ok, k]
+            other = kinematics.inverse_half_angle(leg, p, mode)
+            assert ((-np.pi < other) & (other <= np.pi)).all()
+            error = np.abs(wrap(other - theta))
+            assert (error <= bound(leg, p, theta)).all()
+            worst, seen = max(worst, float(error.max(initial=0.0))), seen + int(ok.sum())
+            count = f"^{1000 - ok.sum()} of 1000 points"
+            with pytest.raises(UnreachableError, match=count):
+                kinematics.inverse_half_angle(leg, foot, mode)
+    assert seen > 1_000_000
+    assert worst < 1e-10
+
+
+def test_two_routes_agree_near_full_stretch_and_fold() -> None:
+    """There the angle is known to the root of rounding only; 1e-10 rad from some 1e-9 on."""
+    rng, worst, far_off = np.random.default_rng(6), 0.0, 0
+    for _ in range(500):
+        near, far, L5 = rng.uniform(0.02, 0.1, 3)
+        u = EPS * (near + far + L5) ** 2
+        inward = np.concatenate([[0.0], 10.0 ** rng.uniform(-17.0, -2.0, 50)])
+        for d in ((near + far) * (1.0 - inward), abs(near - far) * (1.0 + inward)):
+            for turn in (rng.uniform(-np.pi, np.pi, inward.size), np.full(inward.size, np.pi)):
+                r = d[:, None] * unit(turn)
+                for s in (-1, 1):
+                    (theta, ok), (alpha, also) = (
+                        f(r, near, far, s) for f in (side_angle, half_angle)
+                    )
+                    np.testing.assert_array_equal(ok, also)
+                    error, limit = np.abs(wrap(alpha - theta)), side_bound(r, near, far, u)
+                    assert (error[ok] <= limit[ok]).all()
+                    worst = max(worst, float(error[ok].max()))
+                    far_off += int((error[ok] > 1e-10).sum())
+    assert worst < 1e-6
+    assert far_off > 100  # so it is the bound that was tested
+
+
+# oracle
+
+
+@pytest.mark.parametrize("batch", [*BATCHES, (300,)])
+def test_batch_is_a_plain_loop_to_the_last_bit(batch: tuple[int, ...]) -> None:
+    foot, theta = sample(RIGID, batch)
+    found = kinematics.inverse_half_angle(RIGID, foot)
+    np.testing.assert_allclose(found, theta, rtol=0, atol=1e-13)
+    within = kinematics.inverse_within(RIGID, foot, WIDE)
+    for index in np.ndindex(batch):
+        assert (found[index] == kinematics.inverse_half_angle(RIGID, foot[index])).all()
+        assert (within[index] == kinematics.inverse_within(RIGID, foot[index], WIDE)).all()
+    assert found.shape == within.shape == (*batch, 2)
+
+
+# edge
+
+
+@pytest.mark.parametrize(("x", "z"), [(-0.25, -0.5), (-0.25, 0.5)])
+def test_a_plus_c_zero_has_one_knee_at_half_a_turn(x: float, z: float) -> None:
+    """|AB| = 1/4, |BC| = 1/2, in numbers without rounding: a + c = -1/8 + 1/8."""
+    r, near, far = np.array([x, z]), 0.25, 0.5
+    s = 1 if z > 0.0 else -1  # which knee is straight to the left
+    assert principal(half_angle(r, near, far, s)[0]) == math.pi
+    other = half_angle(r, near, far, -s)[0]  # 0 / 0 in the published form
+    assert other == pytest.approx(2.0 * math.atan2(z, x) - s * math.pi, abs=1e-15)
+    for off in (1e-16, -1e-16, 1e-12, -1e-12, 1e-6, -1e-6):
+        moved = np.array([x + off, z])
+        for sign in (-1, 1):
+            alpha, theta = (f(moved, near, far, sign)[0] for f in (half_angle, side_angle))
+            assert abs(wrap(alpha - theta)) < 1e-15
+
+
+@pytest.mark.parametrize(("s", "zero"), [(-1, 0.0), (-1, -0.0), (1, 0.0), (1, -0.0)])
+def test_full_stretch_and_fold_along_the_base_line(s: int, zero: float) -> None:
+    """Where alpha is pi the first form is 0 / 0 in both modes: a + c = b = root = 0."""
+    for x, near, far, alpha in (
+        (0.75, 0.25, 0.5, 0.0),
+        (-0.75, 0.25, 0.5, math.pi),
+        (0.25, 0.25, 0.5, math.pi),
+        (-0.25, 0.25, 0.5, 0.0),
+        (0.25, 0.5, 0.25, 0.0),
+        (-0.25, 0.5, 0.25, math.pi),
+    ):
+        r = np.array([x, zero])
+        assert principal(half_angle(r, near, far, s)[0]) == alpha
+
+
+def test_stretched_leg_is_never_at_minus_pi() -> None:
+    leg = FiveBar(0.25, 0.5, 0.5, 0.25, 0.0)
+    for z in (0.0, -0.0, -1e-20, -1e-300):
+        theta = [kinematics.inverse_half_angle(leg, (-0.75, z), mode) for mode in MODES]
+        np.testing.assert_array_equal(theta, np.pi)
+
+
+def test_foot_on_the_base_line() -> None:
+    """There b = 0: the two knees are mirror images, cos alpha = c / a."""
+    leg = FiveBar(0.05, 0.04, 0.045, 0.055, 0.06)
+    for x in (-0.015, -0.001, 0.0, 0.01, 0.05):
+        X = x + 0.5 * leg.L5
+        alpha = math.acos((X**2 + leg.L1**2 - leg.L2**2) / (2.0 * leg.L1 * X))
+        for mode in MODES:
+            theta = kinematics.inverse_half_angle(leg, (x, 0.0), mode)
+            assert theta[0] == pytest.approx(mode[0] * alpha, abs=1e-14)
+            assert np.abs(theta - kinematics.inverse(leg, (x, 0.0), mode)).max() < 1e-14
+
+
+@pytest.mark.parametrize("tilt", [0.0, 0.3])
+def test_foot_on_and_near_A_of_equal_links(tilt: float) -> None:
+    leg = FiveBar(0.05, 0.05, 0.04, 0.04, 0.03, tilt=tilt)
+    A = kinematics.bases(leg)[0]
+    assert kinematics.inverse_half_angle(leg, A)[0] == 0.0
+    near = A + 10.0 ** np.linspace(-10.0, -3.0, 50)[:, None] * unit(np.linspace(0.0, 6.0, 50))
+    theta, other = kinematics.inverse(leg, near), kinematics.inverse_half_angle(leg, near)
+    # where C is so near to A the direction of AC decides, known to eps |A| / |AC|
+    limit = SOME * EPS * leg.L5 / length(near - A) + SOME * EPS
+    assert (np.abs(wrap(theta - other)[:, 0]) <= limit).all()
+
+
+def test_principal_angles() -> None:
+    beyond = math.nextafter(math.pi, 4.0)
+    angle = np.array([math.pi, -math.pi, beyond, -beyond, 0.1, 7.0, -7.0, 3 * math.pi])
+    found = principal(angle)
+    assert ((found > -math.pi) & (found <= math.pi)).all()
+    np.testing.assert_allclose(np.cos(found - angle), 1.0, rtol=0, atol=1e-15)
+    assert found[0] == found[1] == math.pi
+    assert found[4] == 0.1
+
+
+# refusal
+
+
+FAR = np.full((2, 3, 2), [0.0, -0.04])
+FAR[1, 0], FAR[1, 2] = (0.0, -0.5), (np.nan, 0.0)
+
+
+@pytest.mark.parametrize("leg", [RIGHT, RIGID], ids=["plain", "extended"])
+@pytest.mark.parametrize("mode", [None, (1, 1), (0, 1), "hanging"])
+@pytest.mark.parametrize(
+    "foot", [FAR, (-0.05, 0.2), (0.0, np.inf), (0.0, 1e200), (0.0, 0.0, 0.0), "ab"]
+)
+def test_refusals_are_those_of_inverse(leg: FiveBar, foot: Any, mode: Any) -> None:
+    raised = []
+    for f in (kinematics.inverse, kinematics.inverse_half_angle):
+        with pytest.raises(FiveBarError) as info:
+            f(leg, foot, mode)
+        raised.append((info.type, str(info.value), getattr(info.value, "index", None)))
+    assert raised[0] == raised[1]
+
+
+# joint limits
+
+
+def test_within_is_the_first_mode_within() -> None:
+    """Against a plain loop over points, modes and turns."""
+    rng, seen = np.random.default_rng(8), np.zeros(5, dtype=int)
+    for _ in range(1000):
+        leg = random_leg(rng)
+        foot = rng.uniform(-1.0, 1.0, 2) * leg.size
+        low = rng.uniform(-8.0, 4.0, 2)
+        limits = np.stack([low, low + rng.uniform(0.0, 5.0, 2)], axis=-1)
+        every = kinematics.inverse_all(leg, foot)
+        turns = every[:, None, :] + 2.0 * np.pi * np.arange(-2, 3)[:, None]
+        fits = ((turns >= limits[:, 0]) & (turns <= limits[:, 1])).any(axis=1).all(axis=-1)
+        if not fits.any():
+            seen[4] += 1
+            with pytest.raises(UnreachableError):
+                kinematics.inverse_within(leg, foot, limits)
+            continue
+        k = int(np.argmax(fits))
+        seen[k] += 1
+        theta = kinematics.inverse_within(leg, foot, limits)
+        assert ((theta >= limits[:, 0]) & (theta <= limits[:, 1])).all()
+        np.testing.assert_allclose(wrap(theta - every[k]), 0.0, rtol=0, atol=1e-14)
+    assert seen.min() > 5
+
+
+def test_published_limits_pick_the_knees_outwards_of_an_upright_leg() -> None:
+    foot = [(0.0, 0.06), (0.02, 0.08), (0.05, 0.065)]
+    theta = kinematics.inverse_within(FiveBar(), foot, PUBLISHED_LIMITS)
+    np.testing.assert_array_equal(theta, kinematics.inverse(FiveBar(), foot, (1, -1)))
+    low, high = np.array(PUBLISHED_LIMITS).T
+    assert ((theta >= low) & (theta <= high)).all()
+
+
+def test_limits_are_closed_and_kept_to_rounding_and_fewest_turns_are_taken() -> None:
+    foot, a = (0.0, -0.04), math.atan2(4.0, 3.0)  # angles (-2a or 0, pi or 2a - pi)
+    for turn in (-2.0 * math.pi, 0.0, 4.0 * math.pi):
+        limits = ((turn, turn), (turn + 3.0, turn + math.pi))
+        theta = kinematics.inverse_within(RIGHT, foot, limits)
+        np.testing.assert_allclose(theta, (turn, turn + math.pi), rtol=0, atol=1e-13)
+    theta = kinematics.inverse_within(RIGHT, foot, WIDE)  # all modes: the first
+    np.testing.assert_array_equal(theta, kinematics.inverse(RIGHT, foot, MODES[0]))
+    assert theta[0] == pytest.approx(-2.0 * a)
+
+
+def test_within_names_the_limit() -> None:
+    foot = np.full((2, 2, 2), [0.0, -0.04])
+    foot[1, 0] = (0.0, -0.06)
+    angle = kinematics.inverse_all(RIGHT, foot[0, 0])
+    A, E = (float(angle[0, 0]),) * 2, (float(angle[0, 1]),) * 2
+    for limits, side, unnamed in (((A, (-4.0, 4.0)), "A", "E"), (((-4.0, 4.0), E), "E", "A")):
+        with pytest.raises(
+            UnreachableError, match=rf"^1 of 4 .*theta_{side} must be in .*deg\), got .* or"
+        ) as info:
+            kinematics.inverse_within(RIGHT, foot, limits)
+        assert info.value.index == (1, 0)
+        assert f"theta_{unnamed}" not in str(info.value)
+    every = kinematics.inverse_all(RIGID, sample(RIGID, ())[0])
+    apart = [(x - 1e-3, x + 1e-3) for x in (every[0, 0], every[2, 1])]
+    with pytest.raises(
+        UnreachableError, match=r"^the point .*theta_A .* and theta_E .* in one mode"
+    ):
+        kinematics.inverse_within(RIGID, sample(RIGID, ())[0], apart)
+
+
+def test_within_refuses_what_no_mode_reaches_and_only_that() -> None:
+    with pytest.raises(UnreachableError, match=r"^2 of 6 .*\|AF\|") as info:
+        kinematics.inverse_within(RIGHT, FAR, WIDE)
+    assert info.value.index == (1, 0)
+    foot = np.random.default_rng(9).uniform(-0.15, 0.15, (1000, 2))
+    found = np.isfinite(kinematics.inverse_all(RIGID, foot)[..., 0])
+    own = found[:, MODES.index(RIGID.mode)]
+    some = foot[found.any(axis=-1)]  # with L6 > 0 reach depends on the mode
+    assert (~own & found.any(axis=-1)).any()
+    kinematics.inverse_within(RIGID, some, WIDE)
+    lost = int(np.argmin(found.any(axis=-1)))
+    with pytest.raises(UnreachableError, match=rf"at index \({lost},\)$") as info:
+        kinematics.inverse_within(RIGID, foot, WIDE)
+    assert info.value.index == (lost,)
+
+
+def test_limits_are_refused() -> None:
+    some = (0.0, 1.0)
+    bad: list[Any] = [some, (some,), ((1.0, 0.0), some), ((0.0, np.nan), some), "ab"]
+    for limits in bad:
+        with pytest.raises(ArgumentError, match="limits must"):
+            kinematics.inverse_within(RIGHT, (0.0, -0.04), limits)
