@@ -115,8 +115,43 @@ def replay(run_dir: Positional[Annotated[Path, arg(metavar="RUN_DIR")]], /) -> i
 
     run_directory.check_run(run_dir)
     command = recording.viewer_command(run_dir / "recording.rrd")
+    if sys.platform == "linux" and not {"DISPLAY", "WAYLAND_DISPLAY"} & os.environ.keys():
+        raise ConfigError(
+            f"no screen here: neither DISPLAY nor WAYLAND_DISPLAY is set; open "
+            f"{run_dir / 'recording.rrd'} with Rerun on a machine that has one"
+        )
     quiet = {**os.environ, "CI": "true"}  # keeps Rerun's analytics off
     return subprocess.run(command, env=quiet).returncode
+
+
+def workspace(
+    leg: Positional[Annotated[str, arg(metavar="LEG")]],
+    /,
+    *,
+    out: Annotated[str | None, arg(metavar="PNG")] = None,
+    path: Annotated[str | None, arg(metavar="SCENARIO")] = None,
+) -> int:
+    """Draw what a leg's foot reaches: distance to the boundary, and singular curves.
+
+    Args:
+        leg: A preset's name or a leg's TOML file.
+        out: The picture, .png, .svg or .pdf (default workspace-LEG.png).
+        path: A scenario whose foot path is drawn on it.
+    """
+    from fivebar_sim import workspace_map
+    from fivebar_sim.geometry import FiveBar
+    from fivebar_sim.scenario import Scenario
+
+    drawn = FiveBar.load(leg)
+    followed = None if path is None else Scenario.load(path).foot_path
+    place = Path(f"workspace-{drawn.name}.png" if out is None else out)
+    surveyed = workspace_map.write(drawn, place, followed)
+    area, deepest = 1e4 * surveyed.area, 1e3 * float(surveyed.distance.max())
+    print(  # noqa: T201
+        f"{drawn.name}: the foot reaches {area:.1f} cm2 and gets up to {deepest:.1f} mm inside; "
+        f"drawn in {place}"
+    )
+    return 0
 
 
 def _plans(scenarios: Iterable[str], settings: Sequence[str]) -> list[Plan]:
@@ -208,7 +243,7 @@ def _dispatch(args: list[str]) -> int:
         print(f"fivebar-sim {__version__}")  # noqa: T201
         return 0
     return tyro.extras.subcommand_cli_from_dict(
-        {"run": run, "check": check, "replay": replay},
+        {"run": run, "check": check, "replay": replay, "workspace": workspace},
         prog="fivebar",
         description="Simulate closed-chain five-bar legs; measure tracking and load sharing.",
         args=args,

@@ -10,8 +10,10 @@ from pathlib import Path
 from typing import Any
 
 import msgspec
+import numpy as np
 
 from fivebar_sim import control, resources, tables
+from fivebar_sim.arrays import Array
 from fivebar_sim.checks import check_number
 from fivebar_sim.control import Setpoints
 from fivebar_sim.errors import ArgumentError, ConfigError, unknown
@@ -91,6 +93,11 @@ class Scenario(msgspec.Struct, frozen=True, kw_only=True):
             return slice(first, self.steps)
         periods = math.floor((self.duration - ramp) / period * (1.0 + 1e-9))
         return slice(first, min(round((ramp + periods * period) / h), self.steps))
+
+    @property
+    def foot_path(self) -> Array:
+        """The foot's targets over the whole run, at every step [m], (N + 1, 2)."""
+        return self.path.at(np.arange(self.steps + 1) * self.sim.timestep).position
 
     @classmethod
     def load(cls, source: str | Path, settings: Iterable[str] = ()) -> Scenario:
