@@ -27,7 +27,7 @@ def link(
     ax.plot(*np.stack([start, end], axis=-1), color=colour, lw=5, solid_capstyle="round", zorder=2)
     along = (end - start) / np.linalg.norm(end - start)
     beside = start + part * (end - start) + shift * np.array([-along[1], along[0]])
-    ax.text(*beside, name, color=colour, ha="center", va="center", fontsize=13)
+    ax.text(beside[0], beside[1], name, color=colour, ha="center", va="center", fontsize=13)
 
 
 def joint(ax: Axes, point: Array, name: str, dx: float, dz: float) -> None:
@@ -45,12 +45,17 @@ def angle(ax: Axes, centre: Array, start: float, end: float, radius: float, name
     )
     tip = centre + radius * np.array([np.cos(end), np.sin(end)])
     sense = np.sign(end - start) * np.array([-np.sin(end), np.cos(end)])
+    before = tip - 0.4 * sense
     ax.annotate(
-        "", tip, tip - 0.4 * sense, arrowprops={"arrowstyle": "->", "color": GREY}, zorder=1
+        "",
+        (tip[0], tip[1]),
+        (before[0], before[1]),
+        arrowprops={"arrowstyle": "->", "color": GREY},
+        zorder=1,
     )
     middle = 0.5 * (start + end)
     at = centre + 1.28 * radius * np.array([np.cos(middle), np.sin(middle)])
-    ax.text(*at, name, color="#555555", fontsize=12, ha="center", va="center")
+    ax.text(at[0], at[1], name, color="#555555", fontsize=12, ha="center", va="center")
 
 
 def draw(ax: Axes, leg: FiveBar) -> None:
