@@ -17,8 +17,8 @@ from fivebar_sim.checks import check_number
 from fivebar_sim.errors import ArgumentError, UnreachableError
 from fivebar_sim.geometry import MODES, FiveBar, Mode
 from fivebar_sim.kinematics.planar import wrap
-from fivebar_sim.kinematics.reach import inverse, inverse_all, inverse_nearest
-from fivebar_sim.singularity import EDGE, Distances, distances_of, points_at, shorter_links
+from fivebar_sim.kinematics.reach import inverse, inverse_all, inverse_nearest, points_at
+from fivebar_sim.singularity import EDGE, Distances, distances_of, shorter_links
 
 TIE = 1e-9
 """Squares of angles [rad^2] closer than this are equal: far above rounding, (30 urad)^2."""

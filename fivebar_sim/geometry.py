@@ -151,6 +151,8 @@ class FiveBar:
             _check(key, getattr(self, key), low=0.0, high=HEAVIEST, strict=key == "density")
         for key in ("bend", "tilt"):
             _check(key, getattr(self, key), low=-math.pi, high=math.pi)
+        if not math.hypot(*self.foot_offset) > CLOSING * self.L2:
+            raise GeometryError(f"L6: the foot lies on B; got L6 = L2 = {self.L6:g} m, bent back")
         self._check_modes()
         self._check_masses()
         object.__setattr__(self, "gravity", _floats("gravity", self.gravity, 2))

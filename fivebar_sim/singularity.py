@@ -38,9 +38,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from fivebar_sim.arrays import Array, as_pairs
 from fivebar_sim.geometry import FiveBar, Mode
-from fivebar_sim.kinematics.closure import Points, bases, closed_points, knees
-from fivebar_sim.kinematics.planar import cross, turned
-from fivebar_sim.kinematics.reach import foot_radius_and_angle, inverse
+from fivebar_sim.kinematics.closure import Points, bases, closed_points
+from fivebar_sim.kinematics.planar import cross
+from fivebar_sim.kinematics.reach import foot_radius_and_angle, inverse, points_at
 
 EDGE = 1e-6
 """Sine of the angle between two links a, b that counts as none. A foot on the edge of reach to
@@ -113,17 +113,6 @@ def distances_of(leg: FiveBar, points: Points) -> Distances:
         side_E=cross(points.C_right - E, points.D - E) / max(leg.L4, leg.L3),
         loop=cross(points.D - points.B, points.C_left - points.B) / max(leg.L2, leg.L3),
     )
-
-
-def points_at(leg: FiveBar, foot: Array, theta: Array) -> Points:
-    """Return the joints [m] of poses known to put F at `foot`, of whichever assembly mode that is.
-
-    C = B + R(-phi) BF L2 / |BF|, with phi the angle from BC to BF; B = D is no exception.
-    """
-    B, D = knees(leg, theta)
-    rho, phi = foot_radius_and_angle(leg)
-    C = B + (leg.L2 / rho) * turned(foot - B, -phi)
-    return Points(B, C, C, D, foot)
 
 
 def shorter_links(leg: FiveBar) -> tuple[float, float, float]:

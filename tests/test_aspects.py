@@ -15,7 +15,8 @@ from fivebar_sim.aspects import Aspect, all_aspects, aspect, aspect_at, same_asp
 from fivebar_sim.errors import ArgumentError, LoopOpenError, SingularError, UnreachableError
 from fivebar_sim.geometry import MODES, FiveBar, Mode
 from fivebar_sim.kinematics.planar import unit
-from fivebar_sim.singularity import distances_at, distances_of, points_at, signs
+from fivebar_sim.kinematics.reach import points_at
+from fivebar_sim.singularity import distances_at, distances_of, signs
 
 CLASSIC = FiveBar()
 COAXIAL = FiveBar(0.112, 0.199, 0.199, 0.112, 0.0, 0.0325)
@@ -54,8 +55,8 @@ def test_foot_and_angles_name_one_aspect(batch: tuple[int, ...], mode: Mode, ass
 def test_a_walk_that_meets_no_singularity_stays_in_its_aspect(
     leg: FiveBar, rng: np.random.Generator
 ) -> None:
-    ends = rng.uniform(-1.0, 1.0, (2, 1000, 1, 2)) * leg.size
-    walks = ends[0] + (ends[1] - ends[0]) * np.linspace(0.0, 1.0, 100)[:, None]
+    ends = rng.uniform(-1.0, 1.0, (2, 400, 1, 2)) * leg.size
+    walks = ends[0] + (ends[1] - ends[0]) * np.linspace(0.0, 1.0, 60)[:, None]
     stayed = 0
     for mode in MODES:
         found = assemblies(leg, walks, mode)
@@ -67,7 +68,7 @@ def test_a_walk_that_meets_no_singularity_stays_in_its_aspect(
             assert told.mean() > 0.99
             assert same_aspect(leg, p, q, mode)[told].all()
             stayed += int(clear.sum())
-    assert stayed > 100
+    assert stayed > 40
 
 
 def test_other_assembly_is_another_aspect() -> None:
@@ -105,7 +106,7 @@ def test_parts_are_those_of_the_foot_plane(leg: FiveBar, mode: Mode) -> None:
 
 @pytest.mark.parametrize(("leg", "count"), [(CLASSIC, 10), (RIGID, 12), (COAXIAL, 2)])
 def test_count_does_not_hang_on_the_grid(leg: FiveBar, count: int) -> None:
-    for cells in (60, 91, 120):
+    for cells in (60, 91):
         assert len(all_aspects(leg, cells=cells).part) == count
 
 

@@ -22,7 +22,19 @@ FILES = sorted(
     )
     for path in (ROOT / folder).glob(pattern)
 )
-PURE = ("geometry", "kinematics", "workspace", "hip", "two_link", "paths")
+PURE = (
+    "geometry",
+    "kinematics",
+    "workspace",
+    "hip",
+    "two_link",
+    "singularity",
+    "quality",
+    "aspects",
+    "following",
+    "servo_table",
+    "paths",
+)
 HEAVY = {"mujoco", "rerun", "matplotlib", "scipy"}
 
 

@@ -293,3 +293,7 @@ def test_arguments_are_refused() -> None:
         kinematics.inverse_nearest(RIGHT, [foot] * 2, [theta] * 3)
     with pytest.raises(ArgumentError, match="theta_now must be finite"):
         kinematics.inverse_nearest(RIGHT, foot, (np.nan, 0.0))
+    leg = FiveBar.load("extended")  # its own mode does not reach the first point, another does
+    with pytest.raises(UnreachableError, match="1 of 2 points") as info:
+        kinematics.inverse_nearest(leg, [(0.0, -0.12), (0.5, 0.0)], (0.0, 0.0))
+    assert info.value.index == (1,)

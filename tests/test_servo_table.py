@@ -16,6 +16,7 @@ from fivebar_sim.arrays import Array
 from fivebar_sim.errors import ArgumentError, FiveBarError, UnreachableError
 from fivebar_sim.geometry import MODES, FiveBar
 from fivebar_sim.kinematics.planar import wrap
+from fivebar_sim.kinematics.reach import points_at
 from fivebar_sim.servo_table import (
     HANGING,
     PUBLISHED,
@@ -26,7 +27,6 @@ from fivebar_sim.servo_table import (
     rounding_error,
     servo_angles,
 )
-from fivebar_sim.singularity import points_at
 
 SCRIPT = Path(__file__).parents[1] / "scripts" / "servo_rounding.py"
 DEGREE = math.pi / 180.0
@@ -224,8 +224,9 @@ def test_beyond_the_range_names_index_and_both_units() -> None:
         joint_angles(LEG, np.radians([-5.0, 90.0]))
     assert info.value.index == ()
     for f in (rounding_error, servo_angles):
-        with pytest.raises(UnreachableError):
-            f(LEG, np.radians([100.0, -50.0]))
+        for theta_A, came in ((130.0, "-5"), (-40.0, "185")):
+            with pytest.raises(UnreachableError, match=rf"at A .* got {came} deg"):
+                f(LEG, np.radians([theta_A, -50.0]))
 
 
 def test_arguments_are_refused() -> None:

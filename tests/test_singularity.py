@@ -14,13 +14,13 @@ from fivebar_sim.errors import ArgumentError, LoopOpenError, UnreachableError
 from fivebar_sim.geometry import MODES, FiveBar, Mode
 from fivebar_sim.kinematics import Points
 from fivebar_sim.kinematics.planar import cross, unit
+from fivebar_sim.kinematics.reach import points_at
 from fivebar_sim.singularity import (
     EDGE,
     Distances,
     distances,
     distances_at,
     distances_of,
-    points_at,
     shorter_links,
     signs,
 )

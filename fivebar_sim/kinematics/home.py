@@ -7,9 +7,9 @@ import numpy as np
 from fivebar_sim.arrays import Array
 from fivebar_sim.errors import GeometryError
 from fivebar_sim.geometry import MODES, FiveBar
-from fivebar_sim.kinematics.closure import Points, bases, branch, knees
-from fivebar_sim.kinematics.planar import angle_between, cross, dot, turned
-from fivebar_sim.kinematics.reach import foot_radius_and_angle, inverse_all
+from fivebar_sim.kinematics.closure import bases, branch
+from fivebar_sim.kinematics.planar import angle_between, cross, dot
+from fivebar_sim.kinematics.reach import inverse_all, points_at
 
 GRID = 121
 """Foot positions tried along x and along z."""
@@ -47,7 +47,7 @@ def _best(leg: FiveBar, foot: Array) -> Array | None:
     """Return the best pose (4,) of some foot positions (n, 2), or None if none is on the branch."""
     theta = inverse_all(leg, foot)[:, MODES.index(leg.mode)]
     found = np.isfinite(theta[:, 0])
-    p = _points(leg, foot[found], theta[found])
+    p = points_at(leg, foot[found], theta[found])
     A, E = bases(leg)
     AB, BC, BF = p.B - A, p.C_left - p.B, p.F - p.B
     ED, DC = p.D - E, p.C_right - p.D
@@ -59,14 +59,6 @@ def _best(leg: FiveBar, foot: Array) -> Array | None:
     theta_A, theta_E = theta[found][best]
     theta_B, theta_D = angle_between(AB[best], BC[best]), angle_between(ED[best], DC[best])
     return np.array([theta_A, theta_B, theta_E, theta_D])
-
-
-def _points(leg: FiveBar, foot: Array, theta: Array) -> Points:
-    """Return the joints of poses that are known to put F at `foot`."""
-    B, D = knees(leg, theta)
-    rho, phi = foot_radius_and_angle(leg)
-    C = B + (leg.L2 / rho) * turned(foot - B, -phi)
-    return Points(B, C, C, D, foot)
 
 
 def _sine(a: Array, b: Array) -> Array:

@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 from fivebar_sim.arrays import Array, Bools, as_pairs, at, first_index
 from fivebar_sim.errors import ArgumentError, UnreachableError
 from fivebar_sim.geometry import MODES, FiveBar, Mode
-from fivebar_sim.kinematics.closure import ROUNDING, bases
+from fivebar_sim.kinematics.closure import ROUNDING, Points, bases, knees
 from fivebar_sim.kinematics.planar import direction, turned, unit, wrap
 
 BLOCK = 4096
@@ -150,6 +150,17 @@ def out_of_reach(leg: FiveBar, foot: Array, theta: Array, ok: Bools) -> Unreacha
     )
 
 
+def points_at(leg: FiveBar, foot: Array, theta: Array) -> Points:
+    """Return the joints [m] of poses known to put F at `foot`, of whichever assembly mode that is.
+
+    C = B + R(-phi) BF L2 / |BF|, with phi the angle from BC to BF; B = D is no exception.
+    """
+    B, D = knees(leg, theta)
+    rho, phi = foot_radius_and_angle(leg)
+    C = B + (leg.L2 / rho) * turned(foot - B, -phi)
+    return Points(B, C, C, D, foot)
+
+
 def inverse_all(leg: FiveBar, foot: ArrayLike) -> Array:
     """Return the motor angles of all four working modes, NaN rows where a mode has none.
 
@@ -201,6 +212,7 @@ def inverse_nearest(leg: FiveBar, foot: ArrayLike, theta_now: ArrayLike) -> Arra
     cost = np.sum(step**2, axis=-1)
     lost = np.isnan(cost).all(axis=-1)
     if lost.any():
-        inverse(leg, foot)  # raises: where no mode reaches, the leg's own does not either
+        theta, ok = solve(leg, foot, leg.mode)
+        raise out_of_reach(leg, foot, theta, ok | ~lost[..., None])
     best = np.argmin(np.where(np.isnan(cost), np.inf, cost), axis=-1)
     return now + np.take_along_axis(step, best[..., None, None], axis=-2)[..., 0, :]
