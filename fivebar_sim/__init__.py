@@ -9,13 +9,13 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from fivebar_sim import kinematics, model, workspace
+    from fivebar_sim import dynamics, kinematics, model, workspace
     from fivebar_sim.geometry import FiveBar
     from fivebar_sim.rollout import run
     from fivebar_sim.scenario import Scenario
 
 __version__ = "0.1.0"
-__all__ = ["FiveBar", "Scenario", "kinematics", "model", "run", "workspace"]
+__all__ = ["FiveBar", "Scenario", "dynamics", "kinematics", "model", "run", "workspace"]
 
 _HOMES = {"FiveBar": "geometry", "Scenario": "scenario", "run": "rollout"}
 

@@ -23,6 +23,7 @@ FILES = sorted(
     for path in (ROOT / folder).glob(pattern)
 )
 PURE = (
+    "dynamics",
     "geometry",
     "kinematics",
     "workspace",

@@ -1,0 +1,256 @@
+"""The closed chain in the two motor angles: the knees and C eliminated in closed form.
+
+psi_k is the direction of link k from +x, e_k = (cos psi_k, sin psi_k): e1 along AB, e2 along BC,
+e3 along DC, e4 along ED. So psi_1 = theta_A, psi_4 = theta_E, and the loop
+A + L1 e1 + L2 e2 = E + L4 e4 + L3 e3 gives, crossed with e3 and with e2,
+
+    psi_2_dot = a2 theta_dot_A + b2 theta_dot_E,   a2 = -L1 e1 x e3 / (L2 e2 x e3)
+                                                   b2 =  L4 e4 x e3 / (L2 e2 x e3)
+    psi_3_dot = a3 theta_dot_A + b3 theta_dot_E,   a3 = -L1 e1 x e2 / (L3 e2 x e3)
+                                                   b3 =  L4 e4 x e2 / (L3 e2 x e3)
+
+With these as rows 2 and 3 of G (rows 1 and 4 are the identity's), psi_dot = G theta_dot, and the
+open tree's mass matrix H (links 1, 2 and links 4, 3), its centripetal torques c and weight Q,
+
+    M = G^T H G,   bias = G^T (H g + c - Q),   psi_ddot = G theta_ddot + g
+
+Everything here works on separate coordinates (x, z), arrays of shape (...) or single floats: the
+integrator of one leg calls it a hundred thousand times.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from fivebar_sim import kinematics
+from fivebar_sim.checks import check_number
+from fivebar_sim.errors import ArgumentError
+from fivebar_sim.geometry import HEAVIEST, FiveBar, Link, combined
+from fivebar_sim.kinematics.rates import SINGULAR
+
+Scalar = Any
+"""A float, or an array of shape (...)."""
+
+Vector = tuple[Scalar, Scalar]
+"""(x, z), or (along, across) in a link's own frame."""
+
+
+def cross(a: Vector, b: Vector) -> Scalar:
+    """Return a_x b_z - a_z b_x."""
+    return a[0] * b[1] - a[1] * b[0]
+
+
+def dot(a: Vector, b: Vector) -> Scalar:
+    """Return a_x b_x + a_z b_z."""
+    return a[0] * b[0] + a[1] * b[1]
+
+
+def placed(e: Vector, r: Vector) -> Vector:
+    """Return a vector r = (along, across) of a link's frame in the hip frame, e the link's own."""
+    return r[0] * e[0] - r[1] * e[1], r[0] * e[1] + r[1] * e[0]
+
+
+class Pose(NamedTuple):
+    """A closed pose: directions (x, z) of L1..L4, and how they turn with the motors.
+
+    Attributes:
+        e1: Along AB.
+        e2: Along BC.
+        e3: Along DC.
+        e4: Along ED.
+        a2: d psi_2 / d theta_A.
+        b2: d psi_2 / d theta_E.
+        a3: d psi_3 / d theta_A.
+        b3: d psi_3 / d theta_E.
+    """
+
+    e1: Vector
+    e2: Vector
+    e3: Vector
+    e4: Vector
+    a2: Scalar
+    b2: Scalar
+    a3: Scalar
+    b3: Scalar
+
+
+@dataclass(frozen=True, slots=True)
+class Chain:
+    """A leg's constants; moments of mass are sums of m times (along, across) in a link's frame.
+
+    Attributes:
+        leg: The leg.
+        assembly: +1 or -1.
+        I1: Inertia about A of L1, of L2's mass at B, and of A's rotor [kg m^2].
+        I2: Of L2 about B [kg m^2].
+        I3: Of L3 about D [kg m^2].
+        I4: Inertia about E of L4, of L3's mass at D, and of E's rotor [kg m^2].
+        S1: Moment of L1 about A and of L2's mass at B [kg m].
+        S2: Of L2 about B [kg m].
+        S3: Of L3 about D [kg m].
+        S4: Moment of L4 about E and of L3's mass at D [kg m].
+        AE: From A to E [m].
+        hung: Moment of A's masses at A and of E's at E about O, in the hip frame [kg m].
+    """
+
+    leg: FiveBar
+    assembly: int
+    I1: float
+    I2: float
+    I3: float
+    I4: float
+    S1: Vector
+    S2: Vector
+    S3: Vector
+    S4: Vector
+    AE: Vector
+    hung: Vector
+
+    @classmethod
+    def of(cls, leg: FiveBar, assembly: int | None, payload: float) -> Chain:
+        """Return the constants of a leg that carries a point mass at the foot.
+
+        Args:
+            leg: The leg.
+            assembly: +1 or -1; None is the leg's own.
+            payload: At F [kg].
+
+        Raises:
+            ArgumentError: Unknown assembly, or a payload that is not finite or negative.
+        """
+        sign = leg.assembly if assembly is None else assembly
+        if sign not in (-1, 1):
+            raise ArgumentError(f"assembly must be -1 or 1, got {assembly!r}")
+        check_number("payload", payload, "kg", low=0.0, high=HEAVIEST)
+        one, two, three, four = leg.links
+        two = combined(two, Link(payload, leg.foot_offset, 0.0))
+        x, z = kinematics.bases(leg)[1].tolist()  # E = -A
+        right = three.mass + four.mass - one.mass - two.mass
+        return cls(
+            leg=leg,
+            assembly=sign,
+            I1=about_joint(one) + two.mass * leg.L1**2 + leg.armature,
+            I2=about_joint(two),
+            I3=about_joint(three),
+            I4=about_joint(four) + three.mass * leg.L4**2 + leg.armature,
+            S1=(one.mass * one.com[0] + two.mass * leg.L1, one.mass * one.com[1]),
+            S2=(two.mass * two.com[0], two.mass * two.com[1]),
+            S3=(three.mass * three.com[0], three.mass * three.com[1]),
+            S4=(four.mass * four.com[0] + three.mass * leg.L4, four.mass * four.com[1]),
+            AE=(2.0 * x, 2.0 * z),
+            hung=(right * x, right * z),
+        )
+
+    def pose(self, theta_A: Scalar, theta_E: Scalar) -> Pose:
+        """Return the closed pose of motor angles [rad].
+
+        C as in `kinematics.closure.loop_joint`. With d = |BD| the sine of the angle at C is
+        sqrt(((L2 + L3)^2 - d^2) (d^2 - (L2 - L3)^2)) / 2 L2 L3, checked before any division.
+
+        Raises:
+            LoopOpenError: Where the links do not meet.
+            SingularError: Where B, C and D are in line.
+        """
+        leg = self.leg
+        L1, L2, L3, L4 = leg.L1, leg.L2, leg.L3, leg.L4
+        e1 = np.cos(theta_A), np.sin(theta_A)
+        e4 = np.cos(theta_E), np.sin(theta_E)
+        x = self.AE[0] + L4 * e4[0] - L1 * e1[0]  # BD
+        z = self.AE[1] + L4 * e4[1] - L1 * e1[1]
+        d2 = x * x + z * z
+        area = ((L2 + L3) ** 2 - d2) * (d2 - (L2 - L3) ** 2)  # (4 times that of BCD) squared
+        if not (area > (2.0 * L2 * L3 * SINGULAR) ** 2).all():
+            kinematics.jacobian(leg, np.stack([theta_A, theta_E], axis=-1), self.assembly)
+
+        along = (d2 + (L2 - L3) * (L2 + L3)) / (2.0 * d2)
+        across = self.assembly * np.sqrt(area) / (2.0 * d2)
+        BC = along * x - across * z, along * z + across * x
+        e2 = BC[0] / L2, BC[1] / L2
+        e3 = (BC[0] - x) / L3, (BC[1] - z) / L3
+        s = cross(e2, e3)
+        a2, b2 = -L1 * cross(e1, e3) / (L2 * s), L4 * cross(e4, e3) / (L2 * s)
+        a3, b3 = -L1 * cross(e1, e2) / (L3 * s), L4 * cross(e4, e2) / (L3 * s)
+        return Pose(e1, e2, e3, e4, a2, b2, a3, b3)
+
+    def couplings(self, p: Pose) -> Vector:
+        """Return H12 = L1 e1 . r2 and H43 = L4 e4 . r3 [kg m^2], r_k the moments S_k placed."""
+        H12 = self.leg.L1 * dot(p.e1, placed(p.e2, self.S2))
+        return H12, self.leg.L4 * dot(p.e4, placed(p.e3, self.S3))
+
+    def mass(self, p: Pose) -> tuple[Scalar, Scalar, Scalar]:
+        """Return M_AA, M_AE, M_EE [kg m^2] of M = G^T H G."""
+        H12, H43 = self.couplings(p)
+        I2, I3 = self.I2, self.I3
+        return (
+            self.I1 + 2.0 * H12 * p.a2 + I2 * p.a2 * p.a2 + I3 * p.a3 * p.a3,
+            H12 * p.b2 + I2 * p.a2 * p.b2 + I3 * p.a3 * p.b3 + H43 * p.a3,
+            self.I4 + 2.0 * H43 * p.b3 + I3 * p.b3 * p.b3 + I2 * p.b2 * p.b2,
+        )
+
+    def bias(self, p: Pose, w1: Scalar, w4: Scalar) -> Vector:
+        """Return G^T (H g + c - Q) [N m] at motor rates w1 and w4 [rad/s].
+
+        g2 = k . e3 / (L2 e2 x e3),   g3 = k . e2 / (L3 e2 x e3)
+        k = L1 w1^2 e1 + L2 w2^2 e2 - L4 w4^2 e4 - L3 w3^2 e3
+        c1 = -X12 w2^2,  c2 = X12 w1^2,   X12 = L1 e1 x r2    (4, 3 likewise)
+        Q_k = r_k x gravity
+        """
+        leg = self.leg
+        w2, w3 = p.a2 * w1 + p.b2 * w4, p.a3 * w1 + p.b3 * w4
+        k1, k2, k3, k4 = leg.L1 * w1 * w1, leg.L2 * w2 * w2, leg.L3 * w3 * w3, leg.L4 * w4 * w4
+        k = (
+            k1 * p.e1[0] + k2 * p.e2[0] - k4 * p.e4[0] - k3 * p.e3[0],
+            k1 * p.e1[1] + k2 * p.e2[1] - k4 * p.e4[1] - k3 * p.e3[1],
+        )
+        s = cross(p.e2, p.e3)
+        g2, g3 = dot(k, p.e3) / (leg.L2 * s), dot(k, p.e2) / (leg.L3 * s)
+
+        H12, H43 = self.couplings(p)
+        r1, r2, r3, r4 = self.moments(p)
+        X12, X43 = leg.L1 * cross(p.e1, r2), leg.L4 * cross(p.e4, r3)
+        t1 = H12 * g2 - X12 * w2 * w2 - cross(r1, leg.gravity)
+        t2 = self.I2 * g2 + X12 * w1 * w1 - cross(r2, leg.gravity)
+        t3 = self.I3 * g3 + X43 * w4 * w4 - cross(r3, leg.gravity)
+        t4 = H43 * g3 - X43 * w3 * w3 - cross(r4, leg.gravity)
+        return t1 + p.a2 * t2 + p.a3 * t3, t4 + p.b2 * t2 + p.b3 * t3
+
+    def moments(self, p: Pose) -> tuple[Vector, Vector, Vector, Vector]:
+        """Return r1..r4, the moments S1..S4 in the hip frame [kg m]."""
+        r1, r2 = placed(p.e1, self.S1), placed(p.e2, self.S2)
+        return r1, r2, placed(p.e3, self.S3), placed(p.e4, self.S4)
+
+    def foot_torques(self, p: Pose, force: Vector) -> Vector:
+        """Return J^T F [N m] of a foot force [N]: F moves with perp(AB) psi_1 + perp(BF) psi_2.
+
+        (J^T F)_A = AB x F + a2 BF x F,   (J^T F)_E = b2 BF x F
+        """
+        about_B = cross(placed(p.e2, self.leg.foot_offset), force)
+        return self.leg.L1 * cross(p.e1, force) + p.a2 * about_B, p.b2 * about_B
+
+    def accelerations(self, p: Pose, w: Vector, tau: Vector, force: Vector | None) -> Vector:
+        """Return theta_ddot [rad/s^2] = M^-1 (tau - bias + J^T F)."""
+        M_AA, M_AE, M_EE = self.mass(p)
+        h_A, h_E = self.bias(p, *w)
+        f_A, f_E = (0.0, 0.0) if force is None else self.foot_torques(p, force)
+        t_A, t_E = tau[0] - h_A + f_A, tau[1] - h_E + f_E
+        det = M_AA * M_EE - M_AE * M_AE
+        return (M_EE * t_A - M_AE * t_E) / det, (M_AA * t_E - M_AE * t_A) / det
+
+    def energies(self, p: Pose, w1: Scalar, w4: Scalar) -> Vector:
+        """Return the kinetic energy and the potential one, zero at O [J].
+
+        psi_dot^T H psi_dot / 2,   -gravity . (moments of mass about O)
+        """
+        w2, w3 = p.a2 * w1 + p.b2 * w4, p.a3 * w1 + p.b3 * w4
+        H12, H43 = self.couplings(p)
+        turning = self.I1 * w1 * w1 + self.I2 * w2 * w2 + self.I3 * w3 * w3 + self.I4 * w4 * w4
+        lift = sum(dot(r, self.leg.gravity) for r in (self.hung, *self.moments(p)))
+        return 0.5 * turning + H12 * w1 * w2 + H43 * w4 * w3, -lift
+
+
+def about_joint(link: Link) -> float:
+    """Return the inertia of a link about its inner joint [kg m^2]: I + m |com|^2."""
+    return link.inertia + link.mass * (link.com[0] ** 2 + link.com[1] ** 2)

@@ -1,0 +1,282 @@
+"""Motions of the closed chain: a fixed step for thousands of legs, error control for one.
+
+The state is (theta, theta_dot); knees and C follow from closure in every evaluation, so the loop
+cannot drift open.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from fivebar_sim.arrays import Array, as_pairs, at, finite, first_index, together
+from fivebar_sim.checks import check_number
+from fivebar_sim.dynamics.chain import Chain, Vector
+from fivebar_sim.errors import ArgumentError, DivergedError, LoopOpenError, SingularError
+from fivebar_sim.geometry import FiveBar
+
+Law = Callable[[float, Array, Array], ArrayLike]
+"""(t [s], theta, theta_dot) -> torques (tau_A, tau_E) [N m] or forces (x, z) [N]; arrays have the
+shape (..., 2) of the simulated legs, and the result broadcasts with them. It holds no state: it is
+called several times a step."""
+
+
+TURN_MAX = 0.5
+"""A fixed step in which a motor turns by more resolves nothing [rad]: the method's order is lost
+at far less, and beside a singular pose a first wrong step is that large."""
+
+
+class Motion(NamedTuple):
+    """A simulated motion.
+
+    Attributes:
+        time: [s], (N,).
+        theta: (theta_A, theta_E) [rad], (N, ..., 2).
+        theta_dot: [rad/s], (N, ..., 2).
+    """
+
+    time: Array
+    theta: Array
+    theta_dot: Array
+
+
+def simulate(
+    leg: FiveBar,
+    theta: ArrayLike,
+    theta_dot: ArrayLike,
+    timestep: float,
+    steps: int,
+    torque: Law | None = None,
+    *,
+    foot_force: Law | None = None,
+    every: int = 1,
+    assembly: int | None = None,
+    payload: float = 0.0,
+) -> Motion:
+    """Return the motion of any number of legs by the classic Runge-Kutta method of order 4.
+
+    The error falls with timestep^4 once the step resolves the fastest motion; it is not estimated,
+    and beside a singular pose some steps may be wrong before one is refused: watch the energy.
+
+    Args:
+        leg: The leg; all states are of this one.
+        theta: (theta_A, theta_E) at t = 0 [rad], (..., 2).
+        theta_dot: At t = 0 [rad/s], broadcasts with theta.
+        timestep: h [s].
+        steps: How many.
+        torque: Of the motors; None: they are free.
+        foot_force: What the world does to the foot; None: nothing.
+        every: How many steps are between two rows of the result.
+        assembly: +1 or -1; None is the leg's own.
+        payload: Point mass at F [kg].
+
+    Returns:
+        The motion at t = 0, every h, 2 every h, ...
+
+    Raises:
+        LoopOpenError: Where the links do not meet at t = 0.
+        SingularError: Where B, C and D are in line at t = 0.
+        DivergedError: A leg's loop opens or it becomes singular, a motor turns by more than
+            `TURN_MAX` in a step, or a law says NaN; `.time` is the start of that step.
+        ArgumentError: As `inverse`; a timestep or numbers of steps that are not positive, a law
+            whose result has the wrong shape.
+    """
+    check_number("timestep", timestep, "s", low=0.0, strict=True)
+    for name, count in (("steps", steps), ("every", every)):
+        if not isinstance(count, (int, np.integer)) or count < 1:
+            raise ArgumentError(f"{name} must be a whole number of at least 1, got {count!r}")
+    q, w = _start(theta, theta_dot)
+    plant = _Plant(Chain.of(leg, assembly, payload), torque, foot_force)
+    plant.chain.pose(q[..., 0], q[..., 1])  # the errors of a bad start, as themselves
+    return _runge_kutta(plant, q, w, timestep, range(0, steps + 1, every), steps)
+
+
+def integrate(
+    leg: FiveBar,
+    theta: ArrayLike,
+    theta_dot: ArrayLike,
+    times: ArrayLike,
+    torque: Law | None = None,
+    *,
+    foot_force: Law | None = None,
+    rtol: float = 1e-12,
+    atol: float = 1e-13,
+    assembly: int | None = None,
+    payload: float = 0.0,
+) -> Motion:
+    """Return the motion of one leg to high precision: DOP853, order 8 under error control.
+
+    Args:
+        leg: The leg.
+        theta: (theta_A, theta_E) at times[0] [rad], (2,).
+        theta_dot: At times[0] [rad/s], (2,).
+        times: Where the motion is wanted, rising [s], (N,); between two steps of the integrator it
+            is interpolated at order 7.
+        torque: Of the motors, smooth in all arguments; None: they are free.
+        foot_force: What the world does to the foot, as smooth; None: nothing.
+        rtol: Relative error of a step, at least 2.3e-14.
+        atol: Absolute error of a step [rad, rad/s].
+        assembly: +1 or -1; None is the leg's own.
+        payload: Point mass at F [kg].
+
+    Raises:
+        LoopOpenError: The links do not meet at times[0].
+        SingularError: B, C and D are in line at times[0].
+        DivergedError: The motion runs into a singular pose, or a law says NaN; `.time` is how far
+            the integrator came.
+        ArgumentError: As `simulate`; more than one leg, times that do not rise.
+    """
+    q, w = _start(theta, theta_dot)
+    if q.shape != (2,):
+        raise ArgumentError(f"theta must be of one leg, (2,), got {q.shape}; see simulate")
+    t = finite(np.asarray(times, dtype=np.float64), "times")
+    if t.ndim != 1 or t.size < 2 or not np.all(np.diff(t) > 0.0):
+        raise ArgumentError("times must rise, at least two of them, shape (N,)")
+    check_number("rtol", rtol, "", low=100 * np.finfo(float).eps, high=1.0)
+    check_number("atol", atol, "rad", low=0.0, high=1.0)
+    plant = _Plant(Chain.of(leg, assembly, payload), torque, foot_force)
+    plant.chain.pose(q[0], q[1])
+    states = _dop853(plant, np.concatenate([q, w]), t, rtol, atol)
+    return Motion(t.copy(), states[:, :2].copy(), states[:, 2:].copy())
+
+
+class _UnfitError(Exception):
+    """A law whose result is not finite, or a step that is too long or cannot be short enough."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Plant:
+    """A leg and what drives it."""
+
+    chain: Chain
+    torque: Law | None
+    foot_force: Law | None
+
+    def accelerations(self, t: float, q: Array, w: Array) -> Vector:
+        """Return the two motor accelerations [rad/s^2]."""
+        p = self.chain.pose(q[..., 0], q[..., 1])
+        tau = _told(self.torque, "torque", t, q, w) or (0.0, 0.0)
+        force = _told(self.foot_force, "foot_force", t, q, w)
+        return self.chain.accelerations(p, (w[..., 0], w[..., 1]), tau, force)
+
+    def slope(self, t: float, y: Array) -> Array:
+        """Return dy/dt of one leg's y = (theta, theta_dot); NaN where there is none.
+
+        A trial step beyond a fold of the loop is then refused by the error control, and shortened.
+        """
+        try:
+            alpha = self.accelerations(t, y[:2], y[2:])
+        except (LoopOpenError, SingularError):
+            return np.full(4, np.nan)
+        return np.array([y[2], y[3], *alpha])
+
+
+def _told(law: Law | None, name: str, t: float, q: Array, w: Array) -> Vector | None:
+    """Return both coordinates of what a law says, or None without a law."""
+    if law is None:
+        return None
+    value = as_pairs(law(t, q, w), name)
+    if not np.isfinite(value).all():
+        raise _UnfitError(f"{name} is not finite")
+    if value.shape != q.shape:
+        value = _fitted(value, name, q.shape)
+    return value[..., 0], value[..., 1]
+
+
+def _fitted(value: Array, name: str, shape: tuple[int, ...]) -> Array:
+    """Return a law's result broadcast to the shape of the legs."""
+    try:
+        return np.broadcast_to(value, shape)
+    except ValueError:
+        raise ArgumentError(f"{name} must give shape {shape}, got {value.shape}") from None
+
+
+def _runge_kutta(plant: _Plant, q: Array, w: Array, h: float, rows: range, steps: int) -> Motion:
+    """Return the motion after each number of steps in rows."""
+    motion = Motion(h * np.array(rows), *np.empty((2, len(rows), *q.shape)))
+    motion.theta[0], motion.theta_dot[0] = q, w
+    for k in range(steps):
+        try:
+            with np.errstate(over="ignore", invalid="ignore"):  # the check sees what they leave
+                after, w = _step(plant, k * h, q, w, h)
+            _check_turn(after - q)
+        except (LoopOpenError, SingularError, _UnfitError) as error:
+            raise _diverged(k * h, str(error)) from error
+        q = after
+        if k + 1 in rows:
+            row = (k + 1) // rows.step
+            motion.theta[row], motion.theta_dot[row] = q, w
+    return motion
+
+
+def _check_turn(turn: Array) -> None:
+    """Raise unless every motor turned by a small angle in a step, which NaN is not."""
+    lost = np.logical_not((np.abs(turn) < TURN_MAX).all(axis=-1))
+    if lost.any():
+        raise _UnfitError(
+            f"a motor must turn by less than {TURN_MAX:g} rad in a step{at(first_index(lost))}"
+        )
+
+
+def _step(plant: _Plant, t: float, q: Array, w: Array, h: float) -> tuple[Array, Array]:
+    """Return the state a step later.
+
+        k1 = f(t, y),  k2 = f(t + h/2, y + h/2 k1),  k3 = f(t + h/2, y + h/2 k2)
+        k4 = f(t + h, y + h k3),   y + h/6 (k1 + 2 k2 + 2 k3 + k4)
+
+    of y = (q, w), f = (w, alpha).
+    """
+    half = 0.5 * h
+    w1, alpha1 = w, _stacked(plant, t, q, w)
+    w2 = w + half * alpha1
+    alpha2 = _stacked(plant, t + half, q + half * w1, w2)
+    w3 = w + half * alpha2
+    alpha3 = _stacked(plant, t + half, q + half * w2, w3)
+    w4 = w + h * alpha3
+    alpha4 = _stacked(plant, t + h, q + h * w3, w4)
+    q = q + h / 6.0 * (w1 + 2.0 * (w2 + w3) + w4)
+    return q, w + h / 6.0 * (alpha1 + 2.0 * (alpha2 + alpha3) + alpha4)
+
+
+def _stacked(plant: _Plant, t: float, q: Array, w: Array) -> Array:
+    """Return the accelerations of all legs, (..., 2)."""
+    return np.stack(plant.accelerations(t, q, w), axis=-1)
+
+
+def _dop853(plant: _Plant, y: Array, times: Array, rtol: float, atol: float) -> Array:
+    """Return the states of one leg at the given times, (N, 4)."""
+    from scipy.integrate import DOP853  # the only use of scipy in dynamics, and slow to import
+
+    states, row, reached = np.empty((len(times), 4)), 1, float(times[0])
+    states[0] = y
+    try:
+        solver = DOP853(plant.slope, times[0], y, times[-1], rtol=rtol, atol=atol)
+        while row < len(times):
+            solver.step()
+            reached = float(solver.t)
+            if solver.status == "failed":
+                raise _UnfitError("no step is short enough: are B, C and D in line?")
+            inside = int(np.searchsorted(times, reached, side="right"))
+            if inside > row:
+                states[row:inside] = solver.dense_output()(times[row:inside]).T
+                row = inside
+    except _UnfitError as error:
+        raise _diverged(reached, str(error)) from error
+    return states
+
+
+def _diverged(time: float, why: str) -> DivergedError:
+    return DivergedError(f"the motion breaks down at t = {time:g} s: {why}", time)
+
+
+def _start(theta: ArrayLike, theta_dot: ArrayLike) -> tuple[Array, Array]:
+    """Return a finite state; ArgumentError if it is none."""
+    q, w = together(
+        theta=finite(as_pairs(theta, "theta"), "theta"),
+        theta_dot=finite(as_pairs(theta_dot, "theta_dot"), "theta_dot"),
+    )
+    return q, w
