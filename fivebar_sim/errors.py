@@ -21,11 +21,11 @@ class GeometryError(FiveBarError, ValueError):
     """A leg that cannot exist: a length, mass or mode outside its legal range."""
 
 
-class UnreachableError(FiveBarError, ValueError):
-    """A foot target that no pose reaches.
+class PoseError(FiveBarError, ValueError):
+    """One or more poses of a batch that cannot be, or cannot be answered for.
 
     Attributes:
-        index: Index of the first unreachable target in the batch; () for a single point.
+        index: Index of the first of them in the batch; () for a single pose.
     """
 
     def __init__(self, message: str, index: tuple[int, ...] = ()) -> None:
@@ -33,28 +33,16 @@ class UnreachableError(FiveBarError, ValueError):
         self.index = index
 
 
-class LoopOpenError(FiveBarError, ValueError):
-    """Motor angles at which the links do not meet at C.
-
-    Attributes:
-        index: Index of the first open pose in the batch; () for a single pose.
-    """
-
-    def __init__(self, message: str, index: tuple[int, ...] = ()) -> None:
-        super().__init__(message)
-        self.index = index
+class UnreachableError(PoseError):
+    """Foot targets that no pose reaches."""
 
 
-class SingularError(FiveBarError, ValueError):
-    """A pose at which the asked rate or Jacobian is infinite.
+class LoopOpenError(PoseError):
+    """Motor angles at which the links do not meet at C."""
 
-    Attributes:
-        index: Index of the first singular pose in the batch; () for a single pose.
-    """
 
-    def __init__(self, message: str, index: tuple[int, ...] = ()) -> None:
-        super().__init__(message)
-        self.index = index
+class SingularError(PoseError):
+    """Poses at which the asked rate or Jacobian is infinite."""
 
 
 class ConfigError(FiveBarError, ValueError):
