@@ -104,9 +104,7 @@ def _out_of_reach(
     """Return the error of a path that leaves the workspace, with the nearest reachable point."""
     (k,) = error.index
     lost = f"path out of reach at t = {time[k]:g} s: the foot at {_mm(foot[k])}"
-    if leg.L6 > 0.0:
-        return UnreachableError(f"{lost}; {error}", error.index)
-    nearest = workspace.nearest(leg, foot[k])
+    nearest = workspace.nearest(leg, foot[k], mode=leg.mode)
     out = float(np.hypot(*(foot[k] - nearest)))
     return UnreachableError(
         f"{lost} is {1e3 * out:.3g} mm out; the nearest reachable point is {_mm(nearest)}",

@@ -1,0 +1,294 @@
+"""Coupler curves: what a point on the middle link of a four-bar draws, as dense polylines.
+
+The plane is complex, with the origin at the crank's pivot and the rocker's pivot at `base` on the
+real axis. With theta the crank's direction, k the coupler's angle from the crank:
+
+    B = crank e^(i theta)
+    C = B + coupler e^(i (theta + k))
+    F = B + offset e^(i (theta + k))
+
+and a pose q = (theta, k) closes the four-bar where
+
+    G(q) = (|C - base|^2 - rocker^2) / 2 = 0,   dG/dq = (base C_y, -Im conj(C - base) (C - B))
+
+A curve is kept as its poses q. Between two neighbours a point is found from the chord in q, set
+onto G = 0 by Newton steps along dG/dq. That has no special pose but the curve's double points
+(both pivots, B and C in line), whereas an angle alone would have its dead centres.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fivebar_sim.arrays import Array, Bools
+
+Complex = NDArray[np.complex128]
+
+STEP = 0.04
+"""How far neighbours are apart at most: in both angles and in the direction of F's velocity [rad],
+and in F over `FourBar.scale`."""
+
+FLOOR = 1e-7
+"""Neighbours nearer than this in both angles [rad] are not parted for a turn of the velocity."""
+
+EXACT = 1e-12
+"""Lengths that differ by less, relative to `FourBar.scale`, are equal."""
+
+SPLITS = 60
+"""Halvings at most, of a step in tracing or an interval with a root: to a float's last place."""
+
+
+class FourBar(NamedTuple):
+    """A four-bar with a foot on its coupler; lengths in m, above zero but for `base` and `offset`.
+
+    Attributes:
+        crank: From the origin to B.
+        coupler: From B to C; 0 where B and C are one pin.
+        rocker: From the second pivot to C; one for all poses, or one each, (n,).
+        base: From the origin to the second pivot.
+        offset: F from B, in the frame of the coupler.
+    """
+
+    crank: float
+    coupler: float
+    rocker: float | Array
+    base: float
+    offset: complex
+
+    @property
+    def scale(self) -> float:
+        """What tolerances are relative to [m]."""
+        return self.crank + max(self.coupler, abs(self.offset))
+
+    def joints(self, q: Array) -> tuple[Complex, Complex, Complex]:
+        """Return B, C and F of poses (..., 2), each (...)."""
+        B = self.crank * turn(q[..., 0])
+        along = turn(q[..., 0] + q[..., 1])
+        return B, B + self.coupler * along, B + self.offset * along
+
+    def gradient(self, q: Array) -> tuple[Array, Array]:
+        """Return G [m^2], (...), and dG/dq, (..., 2)."""
+        B, C, _ = self.joints(q)
+        r = C - self.base
+        gap = 0.5 * (np.abs(r) - self.rocker) * (np.abs(r) + self.rocker)
+        return gap, np.stack([self.base * C.imag, -(np.conj(r) * (C - B)).imag], axis=-1)
+
+    def between(self, q: Array, dq: Array, s: Array) -> Array:
+        """Return the poses of the curve at parts s of the chords from q to q + dq."""
+        chord, rounding = _norm2(dq), np.finfo(float).eps * self.scale**2
+        q = q + s[..., None] * dq
+        for _ in range(3):  # each squares the relative gap, first 1e-3
+            gap, slope = self.gradient(q)
+            square = _norm2(slope)
+            fits = (np.abs(gap) > rounding) & (gap**2 <= chord * square)  # within a chord's length
+            step = np.where(fits, gap / np.where(fits, square, 1.0), 0.0)
+            q = q - step[..., None] * slope
+        return q
+
+    def velocity(self, q: Array, dq: Array) -> Complex:
+        """Return dF of one radian along the curve, in the sense of the chord dq, [m], (...)."""
+        _, slope = self.gradient(q)
+        tangent = np.stack([-slope[..., 1], slope[..., 0]], axis=-1)
+        steep = _norm2(slope) > (EXACT * self.scale**2) ** 2
+        tangent = np.where(steep[..., None], tangent, dq)
+        length = np.sqrt(_norm2(tangent))
+        sense = np.where((tangent * dq).sum(axis=-1) < 0.0, -1.0, 1.0)
+        t = tangent * (sense / np.where(length > 0.0, length, 1.0))[..., None]
+        B, _, F = self.joints(q)
+        return 1j * (F * t[..., 0] + (F - B) * t[..., 1])
+
+    def other_elbow(self, q: Array) -> Complex:
+        """Return where C is if the foot stays and crank and coupler bend the other way, (...).
+
+        With w = F e^(-i theta): theta' = theta + 2 arg w, and offset e^(i k) becomes its mirror
+        image. Where F is on the origin the image is C itself.
+        """
+        w = self.crank + self.offset * np.exp(1j * q[..., 1])
+        spin = np.where(w == 0.0, 1.0, w) / np.conj(np.where(w == 0.0, 1.0, w))
+        mirrored = np.conj(self.offset) * np.exp(-1j * q[..., 1]) / self.offset
+        return np.exp(1j * q[..., 0]) * spin * (self.crank + self.coupler * mirrored)
+
+
+def turn(angle: Array) -> Complex:
+    """Return e^(i angle)."""
+    return np.exp(1j * angle)
+
+
+def spans(radius: float, base: float, low: float, high: float) -> list[tuple[float, float]]:
+    """Return the angles x at which low <= |radius e^(i x) - base| <= high, as intervals.
+
+    At a distance r the angle is, with nothing lost near 0 and pi,
+
+        x = 2 atan2(sqrt(r^2 - (radius - base)^2), sqrt((radius + base)^2 - r^2))
+
+    Returns:
+        (start, stop) [rad], at most two, the one below the axis first; (-pi, pi) is a whole turn.
+    """
+    near, far = abs(radius - base), radius + base
+    slack = EXACT * far
+    if not (low <= far + slack and high >= near - slack):
+        return []
+    if near == far:
+        return [(-np.pi, np.pi)]
+    r = np.array([low, high])
+    sine2, cosine2 = (r - near) * (r + near), (far - r) * (far + r)
+    halves = np.arctan2(np.sqrt(np.maximum(sine2, 0.0)), np.sqrt(np.maximum(cosine2, 0.0)))
+    first, last = (2.0 * halves).tolist()
+    if first == 0.0:
+        return [(-last, last)]
+    if last == np.pi:
+        return [(first, 2.0 * np.pi - first)]
+    return [(-last, -first), (first, last)]
+
+
+def trace(bar: FourBar) -> list[Array]:
+    """Return all poses of a four-bar as continuous polylines q (n, 2), closed but for whole turns.
+
+    The crank is swept over its range, as x = middle - half cos t where that is less than a turn,
+    with the coupler on one side of the line from B to the pivot for 0 < t < pi, then on the other.
+    Where B can rest on the second pivot the coupler turns about it freely: a curve of its own.
+    """
+    rocker = float(bar.rocker)
+    reach = (abs(bar.coupler - rocker), bar.coupler + rocker)
+    tiny = EXACT * bar.scale
+    whole = np.linspace(0.0, 2.0 * np.pi, round(2.0 * np.pi / STEP) + 2)
+    if bar.coupler <= tiny:  # B and C are one pin, about which the foot turns
+        ends = {x for x, y in spans(bar.crank, bar.base, *reach) if y - x < 2.0 * np.pi}
+        return [np.stack([np.full_like(whole, x), whole], axis=-1) for x in sorted(ends)]
+    curves: list[Array] = []
+    for start, stop in spans(bar.crank, bar.base, *reach):
+        if stop - start == 2.0 * np.pi:
+            poses = [partial(_turning, bar, side) for side in (-1.0, 1.0)]
+        else:
+            poses = [partial(_swinging, bar, 0.5 * (start + stop), 0.5 * (stop - start))]
+        curves += [piece for pose in poses for piece in _sampled(bar, pose)]
+    if abs(bar.crank - bar.base) <= tiny and abs(bar.coupler - rocker) <= tiny:
+        curves.append(np.stack([np.zeros_like(whole), whole], axis=-1))
+    return curves
+
+
+def cut(bar: FourBar, q: Array, f: Callable[[Array], Array]) -> Array:
+    """Return a polyline q (n, 2) with the poses put in at which f changes its sign.
+
+    A double root between two poses is looked for where f is as near to zero as it moves from one
+    pose to the next.
+    """
+    value = f(q)
+    step = np.abs(np.diff(value))
+    around = step + np.append(step[1:], 0.0) + np.insert(step[:-1], 0, 0.0)
+    sign = np.sign(value[:-1])
+    near = (sign == np.sign(value[1:])) & (np.minimum(*np.abs([value[:-1], value[1:]])) <= around)
+    rows = np.flatnonzero(near)
+    if rows.size:
+        start, dq = q[rows], q[rows + 1] - q[rows]
+        s = _lowest(lambda s: sign[rows] * f(bar.between(start, dq, s)), len(rows))
+        found = bar.between(start, dq, s)
+        keep = sign[rows] * f(found) < 0.0
+        q = np.insert(q, rows[keep] + 1, found[keep], axis=0)
+        value = f(q)
+    rows = np.flatnonzero(value[:-1] * value[1:] < 0.0)
+    start, dq = q[rows], q[rows + 1] - q[rows]
+    s = crossing(lambda s: f(bar.between(start, dq, s)), value[rows], value[rows + 1])
+    return np.insert(q, rows + 1, bar.between(start, dq, s), axis=0)
+
+
+def crossing(f: Callable[[Array], Array], f_0: Array, f_1: Array) -> Array:
+    """Return where functions that change their sign in [0, 1] are zero, by the Illinois rule.
+
+    Args:
+        f: Values at (n,) places, of function 1 to n.
+        f_0: Values at 0.
+        f_1: Values at 1.
+    """
+    a, b, f_a, f_b = np.zeros(len(f_0)), np.ones(len(f_0)), f_0, f_1
+    for _ in range(SPLITS):
+        new = b - f_b * (b - a) / np.where(f_b == f_a, 1.0, f_b - f_a)
+        f_new = f(new)
+        flips = f_new * f_b < 0.0
+        a, f_a = np.where(flips, b, a), np.where(flips, f_b, 0.5 * f_a)
+        moved = np.abs(new - b)
+        b, f_b = new, f_new
+        if not (moved > 1e-15).any():
+            break
+    return b
+
+
+def runs(q: Array, chosen: Bools) -> list[Array]:
+    """Return the pieces of a polyline whose segments (n - 1,) are chosen; a closed one may wrap."""
+    closed = np.allclose(np.exp(1j * q[0]), np.exp(1j * q[-1]), rtol=0, atol=1e-9)
+    if closed and not chosen.all() and chosen[0] and chosen[-1]:
+        first = int(np.argmin(chosen))  # begin in a gap
+        whole = q[-1] - q[0]
+        q = np.concatenate([q[first:-1], q[: first + 1] + whole])
+        chosen = np.roll(chosen, -first)
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], chosen, [False]]).astype(int)))
+    return [q[start : stop + 1] for start, stop in edges.reshape(-1, 2)]
+
+
+def _turning(bar: FourBar, side: float, t: Array) -> Array:
+    return _on_side(bar, t, np.full_like(t, side))
+
+
+def _swinging(bar: FourBar, middle: float, half: float, t: Array) -> Array:
+    return _on_side(bar, middle - half * np.cos(t), np.where(t < np.pi, 1.0, -1.0))
+
+
+def _on_side(bar: FourBar, theta: Array, side: Array) -> Array:
+    """Return the poses of crank angles, with C left (+1) or right (-1) of the line B to base."""
+    B = bar.crank * np.exp(1j * theta)
+    r = bar.base - B
+    d2 = np.abs(r) ** 2
+    K, R = bar.coupler, bar.rocker
+    along = d2 + (K - R) * (K + R)
+    across = np.sqrt(np.maximum(((K + R) ** 2 - d2) * (d2 - (K - R) ** 2), 0.0))
+    k = np.unwrap(np.angle(r * (along + 1j * side * across) * np.exp(-1j * theta)))
+    return np.stack([theta, k], axis=-1)
+
+
+def _sampled(bar: FourBar, pose: Callable[[Array], Array]) -> list[Array]:
+    """Return the poses of 0 <= t <= 2 pi, so dense that neighbours are within `STEP`.
+
+    A jump, which no halving of t fills, parts the polyline.
+    """
+    t = np.linspace(0.0, 2.0 * np.pi, 65)
+    q = pose(t)
+    for _ in range(SPLITS):
+        wide = np.flatnonzero(_coarse(bar, q) & (np.diff(t) > 1e-14))
+        if not wide.size:
+            break
+        t = np.insert(t, wide + 1, 0.5 * (t[wide] + t[wide + 1]))
+        q = pose(t)
+    jumps = np.flatnonzero((np.abs(np.diff(q, axis=0)) > 2.0 * STEP).any(axis=-1)) + 1
+    return [q[a:b] for a, b in pairwise([0, *jumps.tolist(), len(q)])]
+
+
+def _coarse(bar: FourBar, q: Array) -> Bools:
+    """Return which neighbours are too far apart: in angle, in place, in F's direction, in C'."""
+    dq = np.diff(q, axis=0)
+    F, other = bar.joints(q)[2], bar.other_elbow(q)
+    before, after = bar.velocity(q[:-1], dq), bar.velocity(q[1:], dq)
+    turn = np.abs(np.angle(after * np.conj(before)))
+    far = np.maximum(np.abs(np.diff(F)), np.abs(np.diff(other))) > STEP * bar.scale
+    angle = np.abs(dq).max(axis=-1)
+    return (angle > STEP) | ((far | (turn > STEP)) & (angle > FLOOR))
+
+
+def _lowest(f: Callable[[Array], Array], count: int) -> Array:
+    """Return where in [0, 1] functions 1 to n with one minimum each are least: golden section."""
+    golden = 0.5 * (5.0**0.5 - 1.0)
+    a, b = np.zeros(count), np.ones(count)
+    for _ in range(40):  # to 4e-9: the value to rounding
+        c, d = b - golden * (b - a), a + golden * (b - a)
+        left = f(c) < f(d)
+        a, b = np.where(left, a, c), np.where(left, d, b)
+    return 0.5 * (a + b)
+
+
+def _norm2(v: Array) -> Array:
+    return v[..., 0] ** 2 + v[..., 1] ** 2

@@ -1,0 +1,97 @@
+"""Coupler curves as one sampling, and the points of them that are nearest to given points."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fivebar_sim.arrays import Array
+from fivebar_sim.coupler import Complex, FourBar, crossing
+
+Rows = NDArray[np.intp]
+
+
+class Curves(NamedTuple):
+    """The boundary's coupler curves: poses one after the other, and the segments between them.
+
+    Attributes:
+        F: Feet of the poses [m], (n,).
+        first: Pose at which each segment starts; it ends at the next, (m,).
+        q: The poses (theta_A, theta_B) at which segments start [rad], (m, 2).
+        dq: From there to the next, (m, 2).
+        rocker: |EC| of each segment [m], (m,).
+        leave: Velocity of F at the segment's start, of one radian [m], (m,).
+        arrive: Velocity of F at its end, (m,).
+        ends: Start and stop in F of each connected piece, (k, 2).
+    """
+
+    F: Complex
+    first: NDArray[np.intp]
+    q: Array
+    dq: Array
+    rocker: Array
+    leave: Complex
+    arrive: Complex
+    ends: NDArray[np.intp]
+
+
+def gathered(pieces: list[tuple[FourBar, Array]]) -> Curves:
+    """Return polylines of poses as one sampling."""
+    count = np.array([len(q) for _, q in pieces], dtype=np.intp)
+    stop = np.cumsum(count)
+    ends = np.stack([stop - count, stop], axis=-1)
+    first = np.delete(np.arange(int(count.sum())), stop - 1)
+    empty = np.zeros((0, 2))
+    q = np.concatenate([empty, *(q[:-1] for _, q in pieces)])
+    dq = np.concatenate([empty, *(np.diff(q, axis=0) for _, q in pieces)])
+    rocker = np.concatenate([np.zeros(0), *(np.full(len(q) - 1, bar.rocker) for bar, q in pieces)])
+    none = np.zeros(0, dtype=np.complex128)
+    F = np.concatenate([none, *(bar.joints(q)[2] for bar, q in pieces)])
+    leave = np.concatenate([none, *(bar.velocity(q[:-1], np.diff(q, axis=0)) for bar, q in pieces)])
+    arrive = np.concatenate([none, *(bar.velocity(q[1:], np.diff(q, axis=0)) for bar, q in pieces)])
+    return Curves(F, first, q, dq, rocker, leave, arrive, ends)
+
+
+def nearest_on(curves: Curves, bar: FourBar, p: Complex) -> tuple[Rows, Complex, Complex]:
+    """Return the points of the curves at which |p - F| is least, and the nearest poses.
+
+    |p - F| has a minimum within a segment if (p - F) . dF changes from above 0 to below. Segments
+    that cannot come nearer than the nearest pose are left out: none of their points is farther from
+    both their ends than half of their arc, which `STEP` keeps within 1.02 times the chord.
+
+    Args:
+        curves: The curves.
+        bar: Their four-bar; the rocker is taken from the curves.
+        p: Points [m], (n,).
+
+    Returns:
+        owner: Which p a minimum is for, (m,).
+        F: The minimum [m], (m,).
+        pose: For each p the nearest F of the sampled poses [m], (n,).
+    """
+    k = curves
+    d = np.abs(p[:, None] - k.F)
+    pose = d.argmin(axis=1)
+    least = d[np.arange(len(p)), pose][:, None]
+    half = 0.51 * np.abs(k.F[k.first + 1] - k.F[k.first])
+    reach = np.minimum(d[:, k.first], d[:, k.first + 1]) - half
+    owner, segment = np.nonzero(reach <= least * (1.0 + 1e-12))
+    from_start = _along(p[owner] - k.F[k.first[segment]], k.leave[segment])
+    from_end = _along(p[owner] - k.F[k.first[segment] + 1], k.arrive[segment])
+    turns = (from_start > 0.0) & (from_end < 0.0)
+    owner, segment = owner[turns], segment[turns]
+    q, dq, at = k.q[segment], k.dq[segment], p[owner]
+    bar = bar._replace(rocker=k.rocker[segment])
+
+    def slope(s: Array) -> Array:
+        here = bar.between(q, dq, s)
+        return _along(at - bar.joints(here)[2], bar.velocity(here, dq))
+
+    s = crossing(slope, from_start[turns], from_end[turns])
+    return owner, bar.joints(bar.between(q, dq, s))[2], k.F[pose]
+
+
+def _along(v: Complex, direction: Complex) -> Array:
+    return (np.conj(v) * direction).real

@@ -1,0 +1,280 @@
+"""Workspace of legs with an extension: against a search over all radii, on every topology."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from extended_legs import (
+    CORNER_CASES,
+    TOPOLOGIES,
+    Draw,
+    any_leg,
+    around,
+    length,
+    narrow,
+    search,
+)
+
+from fivebar_sim import kinematics, motion, singularity, workspace
+from fivebar_sim.arrays import Array, Bools
+from fivebar_sim.errors import ArgumentError, GeometryError, UnreachableError
+from fivebar_sim.geometry import MODES, FiveBar, Mode
+from fivebar_sim.kinematics.planar import unit
+from fivebar_sim.paths import Line
+
+BENT = FiveBar(0.05, 0.04, 0.035, 0.07, 0.09, 0.02, 0.5, 0.3)
+MINITAUR = FiveBar.load("minitaur")
+EITHER: list[Mode | None] = [None, (-1, 1), (1, 1)]  # both elbows of side A, and each alone
+
+
+def check_against_search(leg: FiveBar, p: Array, mode: Mode | None) -> Bools:
+    """Compare all answers for p (n, 2); return where the search found the boundary."""
+    ok, q = workspace.reachable(leg, p, mode=mode), workspace.nearest(leg, p, mode=mode)
+    signed = workspace.distance(leg, p, mode=mode)
+    assert workspace.reachable(leg, q, mode=mode).all()
+    modes = MODES if mode is None else [mode]
+    solved = kinematics.inverse_all(leg, q)[:, [MODES.index(m) for m in modes]]
+    assert np.isfinite(solved).all(axis=-1).any(axis=-1).all()
+    np.testing.assert_array_equal(q[ok], p[ok])
+    np.testing.assert_array_equal(workspace.nearest(leg, q, mode=mode), q)
+    np.testing.assert_array_equal(signed >= 0.0, ok)
+    settled = 1e-13 if mode is None else 2e-7  # see `nearest`
+    np.testing.assert_allclose(length(p - q)[~ok], -signed[~ok], rtol=0, atol=settled * leg.size)
+
+    scanned = search(leg, p, ok, (-1, 1) if mode is None else mode[:1])
+    assert (np.abs(signed) <= scanned + 1e-12 * leg.size).all()  # never farther
+    seen = np.isfinite(scanned)
+    assert (scanned <= np.abs(signed) + 1e-5 * leg.size)[seen].all()  # never too near
+    return seen
+
+
+# law
+
+
+@pytest.mark.parametrize("draw", TOPOLOGIES)
+def test_nearest_and_distance_against_search(draw: Draw) -> None:
+    rng, found = np.random.default_rng(5), 0
+    for k in range(17):
+        leg = draw(rng)
+        mode = EITHER[k % 3]
+        if mode is not None and not workspace.boundary(leg, mode=mode):
+            mode = None  # no foot position has this elbow
+        found += int(check_against_search(leg, around(leg, rng, 25), mode).sum())
+    assert found > 17 * 25 * 0.9
+
+
+@pytest.mark.parametrize("leg", CORNER_CASES.values(), ids=CORNER_CASES.keys())
+def test_corner_cases_against_search(leg: FiveBar) -> None:
+    rng = np.random.default_rng(3)
+    assert check_against_search(leg, around(leg, rng, 60), None).all()
+
+
+@pytest.mark.parametrize("mode", EITHER)
+def test_boundary_points_are_of_both_sides_and_wherever_nearest_goes(mode: Mode | None) -> None:
+    rng = np.random.default_rng(8)
+    for leg in (BENT, MINITAUR, any_leg(rng), narrow(rng), replace(BENT, L6=0.0)):
+        pieces = workspace.boundary(leg, mode=mode)
+        b = np.concatenate(pieces)
+        assert np.abs(workspace.distance(leg, b, mode=mode)).max() < 1e-13 * leg.size
+        ring = b[:, None] + 1e-6 * leg.size * unit(np.linspace(0.0, 6.0, 24))
+        near = workspace.reachable(leg, ring, mode=mode)
+        assert not near.all(axis=1).any()
+        # of one elbow alone, no more than a thin horn at the end of an arc
+        assert near.any(axis=1).mean() > (0.98 if mode else 1.0 - 1e-9)
+        p = around(leg, rng, 200)
+        q = workspace.nearest(leg, p[~workspace.reachable(leg, p, mode=mode)], mode=mode)
+        to_chord = [np.inf]
+        for start, step in ((x[:-1], np.diff(x, axis=0)) for x in pieces):
+            along = ((q[:, None] - start) * step).sum(-1) / (step**2).sum(-1)
+            on = start + np.clip(along, 0.0, 1.0)[..., None] * step
+            to_chord = np.minimum(to_chord, length(q[:, None] - on).min(axis=1))
+        assert np.max(to_chord) < 1e-3 * leg.size  # the bulge of a step of 0.04: its eighth squared
+
+
+@pytest.mark.parametrize("batch", [(), (1,), (3, 1, 4), (0,)])
+def test_batch_is_a_plain_loop(batch: tuple[int, ...]) -> None:
+    p = around(BENT, np.random.default_rng(3), int(np.prod(batch))).reshape(*batch, 2)
+    for f, item in ((workspace.reachable, ()), (workspace.distance, ()), (workspace.nearest, (2,))):
+        each = [f(BENT, row) for row in p.reshape(-1, 2)]
+        expected = np.array(each).reshape((*batch, *item))
+        # the iteration ends for all at once, so a single point may have fewer rounds
+        np.testing.assert_allclose(f(BENT, p), expected, rtol=0, atol=1e-15)
+        assert f(BENT, p).shape == expected.shape
+
+
+def test_far_point_goes_to_the_support_in_its_direction() -> None:
+    """At 1e15 m all distances round alike; the right answer is the largest c . u."""
+    u = unit(np.linspace(0.05, 6.2, 40))
+    q = workspace.nearest(BENT, 1e15 * u)
+    inside = around(BENT, np.random.default_rng(1), 200_000)
+    inside = inside[workspace.reachable(BENT, inside)]
+    assert ((q * u).sum(axis=-1) >= (inside @ u.T).max(axis=0)).all()
+
+
+@pytest.mark.parametrize("leg", [BENT, replace(BENT, L6=0.0), replace(BENT, L2=0.05, L6=0.0)])
+def test_margin_keeps_away_from_the_boundary(leg: FiveBar) -> None:
+    p, margin = around(leg, np.random.default_rng(4), 4000), 0.003
+    held = workspace.distance(leg, p) >= margin
+    assert 0 < held.sum() < workspace.reachable(leg, p).sum()
+    np.testing.assert_array_equal(workspace.reachable(leg, p, margin=margin), held)
+    if leg.L6 > 0.0:
+        return
+    q = workspace.nearest(leg, p, margin=margin)
+    assert workspace.reachable(leg, q, margin=margin).all()
+    np.testing.assert_array_equal(q[held], p[held])
+    np.testing.assert_allclose(workspace.distance(leg, q[~held]), margin, rtol=0, atol=1e-16)
+    near = length(p[:, None] - p[held]).min(axis=1)
+    assert (length(p - q) <= near).all()
+
+
+# oracle
+
+
+@pytest.mark.parametrize("L6", [1e-20, 1e-13, 1e-9, 1e-6, 1e-4])
+def test_short_extension_is_almost_none(L6: float) -> None:
+    """F is within L6 of C, so the region is within L6 of the rings', and its outside too."""
+    rng = np.random.default_rng(9)
+    for _ in range(5):
+        leg = replace(any_leg(rng), L6=L6)
+        p = around(leg, rng, 200)
+        exact = workspace.distance(replace(leg, L6=0.0), p)
+        atol = 3.0 * L6 + 1e-14 * leg.size
+        np.testing.assert_allclose(workspace.distance(leg, p), exact, rtol=0, atol=atol)
+
+
+@pytest.mark.parametrize("leg", [BENT, MINITAUR])
+def test_reachable_is_inverse_to_the_last_bit(leg: FiveBar) -> None:
+    rng = np.random.default_rng(11)
+    p = np.concatenate([around(leg, rng, 10_000), workspace.nearest(leg, around(leg, rng, 1000))])
+    p = np.concatenate([p] + [p * (1.0 + k * 2.0**-52) for k in range(-12, 13, 3)])
+    solved = np.isfinite(kinematics.inverse_all(leg, p)[..., 0])
+    np.testing.assert_array_equal(workspace.reachable(leg, p), solved.any(axis=-1))
+    for mode in MODES:
+        own = solved[:, MODES.index(mode)]
+        np.testing.assert_array_equal(workspace.reachable(leg, p, mode=mode), own)
+
+
+@pytest.mark.parametrize("L6", [0.0, 0.02])
+@pytest.mark.parametrize("mode", MODES)
+def test_singular_curves_are_where_the_loop_flips(L6: float, mode: Mode) -> None:
+    """All their points are singular, and wherever `loop` changes its sign there is a curve."""
+    for leg in (replace(BENT, L6=L6), FiveBar(0.05, 0.06, 0.06, 0.045, 0.04, L6, 0.5, 0.3)):
+        curves = np.concatenate(workspace.singular_curves(leg, mode))
+        own = kinematics.inverse_all(leg, curves)[:, MODES.index(mode)]
+        sound = np.isfinite(own).all(axis=-1)
+        assert sound.mean() > 0.98  # not the ends, on the edge of reach to rounding
+        loop = singularity.distances_at(leg, curves[sound], mode).loop
+        # the motors of a foot near the edge are off by the square root of rounding
+        assert np.abs(loop).max() < 1e-6 * leg.size
+        line = np.linspace(-1.1, 1.1, 241) * leg.size
+        grid = np.stack(np.meshgrid(line, line), axis=-1)
+        inside = workspace.reachable(leg, grid, mode=mode)
+        loop = np.full(inside.shape, np.nan)
+        loop[inside] = singularity.distances_at(leg, grid[inside], mode).loop
+        flips = grid[:, 1:][loop[:, 1:] * loop[:, :-1] < 0.0]
+        to_curve = length(flips[:, None] - curves).min(axis=1)
+        assert len(flips) > 20
+        assert (to_curve < 0.05 * leg.size).mean() > 0.999
+        assert (to_curve < 0.025 * leg.size).mean() > 0.9
+
+
+# edge
+
+
+def test_coaxial_leg_has_circles() -> None:
+    """|AC| = L3 + L4 or L4 - L3 leaves one angle at B to either side, so |AF| is known."""
+    leg = FiveBar(0.05, 0.06, 0.01, 0.08, 0.0, 0.03, 0.9)
+    k = [math.acos((c**2 - leg.L1**2 - leg.L2**2) / (2.0 * leg.L1 * leg.L2)) for c in (0.07, 0.09)]
+    offset = complex(*leg.foot_offset)
+    left, right = (sorted(abs(leg.L1 + offset * np.exp(1j * s * x)) for x in k) for s in (1, -1))
+    assert left[1] < right[0]  # two rings
+    for r, d in (
+        (left[0] - 0.001, -0.001),
+        (left[1] - 0.001, 0.001),
+        (0.5 * (left[1] + right[0]), 0.5 * (left[1] - right[0])),
+        (right[1] + 0.1, -0.1),
+    ):
+        for angle in np.linspace(0.0, 6.0, 20):
+            assert workspace.distance(leg, r * unit(angle)) == pytest.approx(d, abs=1e-15)
+
+
+def test_minitaur_reaches_a_whole_ring() -> None:
+    pieces = workspace.boundary(MINITAUR)
+    assert [float(length(x).mean()) for x in pieces] == pytest.approx([0.1195, 0.3435], rel=1e-13)
+    bent = replace(MINITAUR, bend=0.6)  # C on its outer circle is amid the ring, yet no boundary
+    assert len(workspace.boundary(bent)) == 2
+    np.testing.assert_allclose(workspace.nearest(MINITAUR, (0.0, 0.0)), (-0.1195, 0.0), atol=1e-15)
+
+
+def test_fully_stretched_links_leave_one_point() -> None:
+    leg = FiveBar(0.125, 0.25, 0.5, 0.25, 1.125, 0.125, 0.5 * math.pi)
+    for p in ((0.0, 0.0), (3.0, -1.0), (-0.1875, 2.0)):
+        np.testing.assert_allclose(workspace.nearest(leg, p), (-0.1875, 0.125), rtol=0, atol=2e-8)
+
+
+def test_equal_coaxial_legs_are_singular_everywhere_in_modes_of_equal_signs() -> None:
+    assert workspace.singular_curves(MINITAUR, (1, 1)) == []
+    assert workspace.singular_curves(MINITAUR, (-1, 1)) == []  # where it only folds at the edges
+
+
+def test_path_out_of_reach_names_the_nearest_point_of_its_own_mode() -> None:
+    leg = FiveBar.load("extended")
+    home = kinematics.forward(leg, kinematics.home(leg)[[0, 2]])
+    path = Line(frequency=1.0, start=tuple(home.tolist()), stop=(0.0, -0.5))
+    with pytest.raises(UnreachableError, match=r"mm out; the nearest reachable point is \("):
+        motion.plan(leg, path, 1000, 1e-3)
+
+
+# refusal
+
+
+@pytest.mark.parametrize("f", [workspace.reachable, workspace.nearest, workspace.distance])
+def test_arguments_are_refused(f: Callable[..., object]) -> None:
+    for foot in ((0.0, 0.0, 0.0), 1.0, "ab"):
+        with pytest.raises(ArgumentError, match=r"foot must .*shape \(\.\.\., 2\)"):
+            f(BENT, foot)
+    for leg in (BENT, FiveBar()):
+        with pytest.raises(ArgumentError, match=r"mode must be one of .*, got \(0, 1\)"):
+            f(leg, (0.0, -0.08), mode=(0, 1))
+
+
+@pytest.mark.parametrize("margin", [-1e-3, np.nan, np.inf, "1"])
+def test_margin_is_refused(margin: float) -> None:
+    for leg in (BENT, FiveBar()):
+        for f in (workspace.reachable, workspace.nearest):
+            with pytest.raises(ArgumentError, match=r"margin must be in \[0, inf\) m, got"):
+                f(leg, (0.0, -0.08), margin=margin)
+
+
+def test_margin_of_an_extended_leg_has_no_nearest() -> None:
+    with pytest.raises(ArgumentError, match=r"margin must be 0 m .* L6 > 0, got 0\.001 m"):
+        workspace.nearest(BENT, (0.0, -0.08), margin=1e-3)
+
+
+@pytest.mark.parametrize("leg", [FiveBar(), FiveBar(L1=0.06)])
+def test_margin_beyond_the_width_leaves_nothing(leg: FiveBar) -> None:
+    p = around(leg, np.random.default_rng(0), 1000)
+    assert not workspace.reachable(leg, p, margin=0.5).any()
+    with pytest.raises(GeometryError, match=r"less a margin of 0\.5 m is empty to rounding"):
+        workspace.nearest(leg, p, margin=0.5)
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf, 1e200])
+def test_not_finite_is_not_reachable_and_has_no_nearest(bad: float) -> None:
+    p = [[0.0, -0.03], [0.0, bad]]
+    assert not workspace.reachable(BENT, p)[1]
+    for f in (workspace.nearest, workspace.distance):
+        with pytest.raises(ArgumentError, match=r"finite, below 1e\+150 m, got .* at index \(1,\)"):
+            f(BENT, p)
+
+
+def test_foot_on_B_and_an_elbow_without_reach_are_refused() -> None:
+    with pytest.raises(GeometryError, match=r"L6: the foot is on B; .* above 1.*e-10 m, got"):
+        workspace.nearest(FiveBar(L6=0.06 * (1.0 + 1e-10), bend=math.pi), (0.0, 0.0))
+    stretched = FiveBar(0.05, 0.06, 0.03, 0.04, 0.18, 0.03, 0.9)
+    with pytest.raises(GeometryError, match=r"workspace with s_A = \+1 is empty"):
+        workspace.distance(stretched, (0.0, 0.0), mode=(1, 1))
