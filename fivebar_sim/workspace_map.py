@@ -58,7 +58,7 @@ def survey(leg: FiveBar, cells: int = CELLS) -> Map:
     reach = 1.05 * (leg.L1 + leg.L2 + leg.L6 + float(np.hypot(*A)))
     line = np.linspace(-reach, reach, cells)
     foot = np.stack(np.meshgrid(line, line), axis=-1)
-    distance = workspace.distance(leg, foot)
+    distance = workspace.distance(leg, foot, mode=leg.mode)
     inside = np.isfinite(kinematics.inverse_all(leg, foot)[..., MODES.index(leg.mode), 0])
     loop = np.full(distance.shape, np.nan)
     loop[inside] = singularity.distances_at(leg, foot[inside]).loop

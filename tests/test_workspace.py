@@ -110,10 +110,11 @@ def length(v: Array) -> Array:
 # law
 
 
+@pytest.mark.parametrize("count", [50, pytest.param(334, marks=pytest.mark.long)])
 @pytest.mark.parametrize("draw", TOPOLOGIES)
-def test_nearest_and_distance_against_search(draw: Draw) -> None:
+def test_nearest_and_distance_against_search(draw: Draw, count: int) -> None:
     rng, found = np.random.default_rng(5), 0
-    for _ in range(50):
+    for _ in range(count):
         leg = draw(rng)
         p = around(leg, rng, 40)
         ok, q = workspace.reachable(leg, p), workspace.nearest(leg, p)
@@ -132,7 +133,7 @@ def test_nearest_and_distance_against_search(draw: Draw) -> None:
         found += int(seen.sum())
         if draw is not sliver:  # whose corners the scan may miss; else it misses by a step at most
             assert (scanned <= np.abs(signed) + 4e-3 * leg.size)[seen].all()  # never too near
-    assert found > (0 if draw is sliver else 50 * 40 * 0.9)
+    assert found > (0 if draw is sliver else count * 40 * 0.9)
 
 
 def test_topologies_are_what_they_say() -> None:
