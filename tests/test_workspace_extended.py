@@ -21,6 +21,7 @@ from extended_legs import (
 
 from fivebar_sim import kinematics, motion, singularity, workspace
 from fivebar_sim.arrays import Array, Bools
+from fivebar_sim.coupler import FourBar, cut, trace
 from fivebar_sim.errors import ArgumentError, GeometryError, UnreachableError
 from fivebar_sim.geometry import MODES, FiveBar, Mode
 from fivebar_sim.kinematics.planar import unit
@@ -162,7 +163,8 @@ def test_reachable_is_inverse_to_the_last_bit(leg: FiveBar) -> None:
 @pytest.mark.parametrize("mode", MODES)
 def test_singular_curves_are_where_the_loop_flips(L6: float, mode: Mode) -> None:
     """All their points are singular, and wherever `loop` changes its sign there is a curve."""
-    for leg in (replace(BENT, L6=L6), FiveBar(0.05, 0.06, 0.06, 0.045, 0.04, L6, 0.5, 0.3)):
+    equal = FiveBar(0.05, 0.06, 0.06, 0.045, 0.04, L6, 0.5, 0.3)
+    for leg in (replace(BENT, L6=L6), replace(BENT, L3=0.05, L6=L6), equal):
         curves = np.concatenate(workspace.singular_curves(leg, mode))
         own = kinematics.inverse_all(leg, curves)[:, MODES.index(mode)]
         sound = np.isfinite(own).all(axis=-1)
@@ -222,11 +224,29 @@ def test_equal_coaxial_legs_are_singular_everywhere_in_modes_of_equal_signs() ->
 
 
 def test_path_out_of_reach_names_the_nearest_point_of_its_own_mode() -> None:
-    leg = FiveBar.load("extended")
-    home = kinematics.forward(leg, kinematics.home(leg)[[0, 2]])
-    path = Line(frequency=1.0, start=tuple(home.tolist()), stop=(0.0, -0.5))
-    with pytest.raises(UnreachableError, match=r"mm out; the nearest reachable point is \("):
-        motion.plan(leg, path, 1000, 1e-3)
+    """The path leaves what s_A = -1 reaches for where only s_A = +1 does."""
+    start = kinematics.forward(BENT, kinematics.home(BENT)[[0, 2]], assembly=-1)
+    p = around(BENT, np.random.default_rng(1), 3000)
+    p = p[workspace.reachable(BENT, p) & ~workspace.reachable(BENT, p, mode=BENT.mode)]
+    stop = p[length(p - start).argmin()]
+    path = Line(frequency=1.0, start=tuple(start.tolist()), stop=tuple(stop.tolist()))
+    with pytest.raises(UnreachableError, match=r"nearest reachable point is \(") as error:
+        motion.plan(BENT, path, 1000, 1e-3)
+    lost = path.at(np.array([1e-3 * error.value.index[0]]))[0][0]
+    assert workspace.reachable(BENT, lost)
+    out = -workspace.distance(BENT, lost, mode=BENT.mode)
+    assert out > 0.0
+    assert f"is {1e3 * out:.3g} mm out" in str(error.value)
+
+
+def test_cut_finds_two_roots_between_two_poses() -> None:
+    bar = FourBar(0.03, 0.06, 0.05, 0.045, 0.08 + 0.01j)  # its crank turns round
+    q = trace(bar)[0]
+    for k in (0, len(q) // 3, len(q) - 2):
+        middle = bar.between(q[k], q[k + 1] - q[k], np.array(0.4))[0]
+        found = cut(bar, q, lambda q, at=middle: (q[..., 0] - at) ** 2 - 1e-8)[:, 0]
+        for root in (middle - 1e-4, middle + 1e-4):
+            assert np.abs(found - root).min() < 1e-12
 
 
 # refusal
@@ -255,7 +275,7 @@ def test_margin_of_an_extended_leg_has_no_nearest() -> None:
         workspace.nearest(BENT, (0.0, -0.08), margin=1e-3)
 
 
-@pytest.mark.parametrize("leg", [FiveBar(), FiveBar(L1=0.06)])
+@pytest.mark.parametrize("leg", [FiveBar(), FiveBar(L1=0.06, L4=0.06)])
 def test_margin_beyond_the_width_leaves_nothing(leg: FiveBar) -> None:
     p = around(leg, np.random.default_rng(0), 1000)
     assert not workspace.reachable(leg, p, margin=0.5).any()
