@@ -81,13 +81,13 @@ class FourBar(NamedTuple):
 
     def between(self, q: Array, dq: Array, s: Array) -> Array:
         """Return the poses of the curve at parts s of the chords from q to q + dq."""
-        chord, rounding = _norm2(dq), np.finfo(float).eps * self.scale**2
+        rounding = np.finfo(float).eps * self.scale**2
         q = q + s[..., None] * dq
         for _ in range(3):  # each squares the relative gap, first 1e-3
             gap, slope = self.gradient(q)
             square = _norm2(slope)
-            fits = (np.abs(gap) > rounding) & (gap**2 <= chord * square)  # within a chord's length
-            step = np.where(fits, gap / np.where(fits, square, 1.0), 0.0)
+            off = (np.abs(gap) > rounding) & (square > 0.0)
+            step = np.where(off, gap / np.where(off, square, 1.0), 0.0)
             q = q - step[..., None] * slope
         return q
 
