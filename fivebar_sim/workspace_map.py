@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fivebar_sim import kinematics, singularity, workspace
+from fivebar_sim import kinematics, workspace
 from fivebar_sim.arrays import Array
 from fivebar_sim.errors import ConfigError
-from fivebar_sim.geometry import MODES, FiveBar
+from fivebar_sim.geometry import FiveBar
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -30,15 +30,12 @@ class Map(NamedTuple):
     Attributes:
         x: [m], hip frame, (m,).
         z: [m], (n,).
-        distance: Signed distance to the boundary of the reachable region [m], (n, m).
-        loop: Signed distance of B, C, D from being in line in the leg's working mode [m], NaN
-            where that mode does not reach, (n, m).
+        distance: Signed distance to the edge of what the leg's working mode reaches [m], (n, m).
     """
 
     x: Array
     z: Array
     distance: Array
-    loop: Array
 
     @property
     def area(self) -> float:
@@ -59,12 +56,9 @@ def survey(leg: FiveBar, cells: int = CELLS) -> Map:
     line = np.linspace(-reach, reach, cells)
     foot = np.stack(np.meshgrid(line, line), axis=-1)
     distance = workspace.distance(leg, foot, mode=leg.mode)
-    inside = np.isfinite(kinematics.inverse_all(leg, foot)[..., MODES.index(leg.mode), 0])
-    loop = np.full(distance.shape, np.nan)
-    loop[inside] = singularity.distances_at(leg, foot[inside]).loop
     within = distance > 0.0
     rows, columns = _span(np.any(within, axis=1)), _span(np.any(within, axis=0))
-    return Map(line[columns], line[rows], distance[rows, columns], loop[rows, columns])
+    return Map(line[columns], line[rows], distance[rows, columns])
 
 
 def _span(found: ArrayLike) -> slice:
@@ -114,11 +108,12 @@ def _draw(ax: Axes, leg: FiveBar, surveyed: Map, path: Array | None) -> None:
     inside = np.where(distance >= 0.0, distance, np.nan)
     colours = ax.pcolormesh(x, z, inside, cmap="viridis", shading="nearest", rasterized=True)
     ax.figure.colorbar(colours, ax=ax, label="distance to the boundary [mm]", shrink=0.8)
-    ax.contour(x, z, distance, levels=[0.0], colors="black", linewidths=1.2)
-    if np.nanmin(surveyed.loop) < 0.0 < np.nanmax(surveyed.loop):
-        ax.contour(x, z, surveyed.loop, levels=[0.0], colors="crimson", linewidths=1.4)
-        ax.plot([], [], color="crimson", label="singular: B, C, D in line")
-    ax.plot([], [], color="black", label="boundary: a side chain straight or folded")
+    for curves, colour, label in (
+        (workspace.boundary(leg, mode=leg.mode), "black", "boundary: a side chain in line"),
+        (workspace.singular_curves(leg), "crimson", "singular: B, C, D in line"),
+    ):
+        for k, curve in enumerate(curves):
+            ax.plot(*(1e3 * curve).T, color=colour, lw=1.3, label=label if k == 0 else None)
     rest = kinematics.chain_points(leg, kinematics.home(leg))
     A, E = kinematics.bases(leg)
     for chain in ((A, rest.B, rest.C_left, rest.F), (E, rest.D, rest.C_right)):
