@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from importlib.metadata import EntryPoint, entry_points
-from typing import Any, Protocol, runtime_checkable
+from typing import Any, ClassVar, Literal, NamedTuple, Protocol, runtime_checkable
 
 import msgspec
 
@@ -14,6 +14,64 @@ from fivebar_sim.motion import Motion
 from fivebar_sim.servo import Integrator, Servo
 
 GROUP = "fivebar_sim.controllers"
+
+
+Drive = Literal["position", "torque"]
+"""What a command is: an angle for the servo [rad], or a torque for the bare motor [N m]."""
+
+
+class Observation(NamedTuple):
+    """What the sensors of some legs say at a control step; arrays are (..., 2), in the order A, E.
+
+    Attributes:
+        time: Of the control step [s].
+        theta: [rad].
+        theta_dot: [rad/s].
+    """
+
+    time: float
+    theta: Array
+    theta_dot: Array
+
+
+class Reference(NamedTuple):
+    """What those legs shall do at the time of a control step; arrays are (..., 2).
+
+    Attributes:
+        foot: [m], with its rates foot_dot and foot_ddot.
+        theta: (theta_A, theta_E) [rad], with their rates theta_dot and theta_ddot.
+        force: What the world is expected to do to the foot [N].
+        payload: Point mass that the foot carries [kg].
+    """
+
+    foot: Array
+    foot_dot: Array
+    foot_ddot: Array
+    theta: Array
+    theta_dot: Array
+    theta_ddot: Array
+    force: Array
+    payload: float
+
+
+@runtime_checkable
+class Feedback(Protocol):
+    """A controller that is asked once a control period, with what the sensors say.
+
+    A small frozen object of gains, without memory: a scenario's table [controller] is read into
+    it, so it is a msgspec Struct.
+
+    Attributes:
+        drive: Whether its commands are angles or torques.
+        period: Time between two commands [s], a whole number of timesteps.
+    """
+
+    drive: ClassVar[Drive]
+    period: float
+
+    def command(self, leg: FiveBar, servo: Servo, seen: Observation, wanted: Reference) -> Array:
+        """Return the commands (A, E) that hold until the next one [rad or N m], (..., 2)."""
+        ...
 
 
 @runtime_checkable

@@ -21,6 +21,8 @@ class Motion(NamedTuple):
         time: [s], (N + 1,).
         foot: [m], (N + 1, 2); foot_dot and foot_ddot are its rates.
         q: (theta_A, theta_B, theta_E, theta_D) [rad], (N + 1, 4); q_dot and q_ddot are its rates.
+        force: What the world is expected to do to the foot [N], (N + 1, 2).
+        payload: Point mass that the foot carries [kg].
     """
 
     time: Array
@@ -30,6 +32,8 @@ class Motion(NamedTuple):
     q: Array
     q_dot: Array
     q_ddot: Array
+    force: Array
+    payload: float
 
     @property
     def timestep(self) -> float:
@@ -37,7 +41,15 @@ class Motion(NamedTuple):
         return float(self.time[1])
 
 
-def plan(leg: FiveBar, path: FootPath, steps: int, timestep: float) -> Motion:
+def plan(
+    leg: FiveBar,
+    path: FootPath,
+    steps: int,
+    timestep: float,
+    *,
+    force: Array | None = None,
+    payload: float = 0.0,
+) -> Motion:
     """Return the motion of a leg along a path, from the analytic inverse kinematics.
 
     Args:
@@ -45,6 +57,8 @@ def plan(leg: FiveBar, path: FootPath, steps: int, timestep: float) -> Motion:
         path: The foot's path.
         steps: N.
         timestep: h [s].
+        force: What the world is expected to do to the foot [N], (N + 1, 2); None: nothing.
+        payload: Point mass that the foot carries [kg].
 
     Raises:
         UnreachableError: Where the path leaves the workspace, where the leg's assembly mode does
@@ -62,7 +76,8 @@ def plan(leg: FiveBar, path: FootPath, steps: int, timestep: float) -> Motion:
     rest = kinematics.home(leg)
     q = _continuous(rest, q)
     _check_stops(leg, rest, foot, time, q)
-    return Motion(time, foot, foot_dot, foot_ddot, q, q_dot, q_ddot)
+    force = np.zeros_like(foot) if force is None else force
+    return Motion(time, foot, foot_dot, foot_ddot, q, q_dot, q_ddot, force, payload)
 
 
 def _continuous(rest: Array, q: Array) -> Array:
