@@ -8,10 +8,17 @@ import numpy as np
 
 from fivebar_sim import kinematics, workspace
 from fivebar_sim.arrays import Array, Bools
-from fivebar_sim.errors import UnreachableError
+from fivebar_sim.errors import ArgumentError, UnreachableError
 from fivebar_sim.geometry import FiveBar
 from fivebar_sim.kinematics.stops import C_STOP, MOTOR_RANGE, angle_at_C, stops_at_C
-from fivebar_sim.paths import FootPath
+from fivebar_sim.paths import FootPath, Sample
+
+KNEE_STOP = C_STOP
+"""How near to straight or folded the knees come where targets are projected [rad]: as near as the
+angle at C comes. At the edge itself a side chain is in line, and the joints' rates are infinite."""
+
+FASTEST_SLIDE = 10.0
+"""How many times as fast as the path's targets their projections may move."""
 
 
 class Motion(NamedTuple):
@@ -52,6 +59,10 @@ def plan(
 ) -> Motion:
     """Return the motion of a leg along a path, from the analytic inverse kinematics.
 
+    With `outside = "nearest"` targets out of reach become the nearest points in reach, those within
+    `edge_margin` of the workspace's edge included, so that the foot slides along the edge, less
+    that margin. If there are any, foot and joint rates are not the path's but those of `rates`.
+
     Args:
         leg: The leg; it moves in its own working mode and assembly mode.
         path: The foot's path.
@@ -63,21 +74,84 @@ def plan(
     Raises:
         UnreachableError: Where the path leaves the workspace, where the leg's assembly mode does
             not reach, or where a joint would pass its stop; says at what time, how far out and
-            what is nearest. `.index` is the step.
+            what is nearest. Where a projected target jumps. `.index` is the step.
         SingularError: Where a side chain is straight or folded on the way.
+        ArgumentError: Targets to be projected, for a leg with L6 > 0: it has no such margin.
     """
     time: Array = np.arange(steps + 1, dtype=np.float64) * timestep
-    foot, foot_dot, foot_ddot = path.at(time)
+    wanted = path.at(time)
+    foot = _projected(leg, wanted, time) if path.outside == "nearest" else wanted
     try:
-        kinematics.inverse(leg, foot)
+        kinematics.inverse(leg, foot.position)
     except UnreachableError as error:
-        raise _out_of_reach(leg, foot, time, error) from None
-    q, q_dot, q_ddot = kinematics.joint_motion(leg, foot, foot_dot, foot_ddot)
+        raise _out_of_reach(leg, foot.position, time, error) from None
+    q, q_dot, q_ddot = kinematics.joint_motion(leg, *foot)
     rest = kinematics.home(leg)
     q = _continuous(rest, q)
-    _check_stops(leg, rest, foot, time, q)
-    force = np.zeros_like(foot) if force is None else force
-    return Motion(time, foot, foot_dot, foot_ddot, q, q_dot, q_ddot, force, payload)
+    _check_stops(leg, rest, foot.position, time, q)
+    if foot is not wanted:
+        q_dot, q_ddot = rates(q, timestep)
+    force = np.zeros_like(foot.position) if force is None else force
+    return Motion(time, *foot, q, q_dot, q_ddot, force, payload)
+
+
+def edge_margin(leg: FiveBar) -> float:
+    """Return how far projected targets stay from the edge of the workspace [m].
+
+    At least so far that no knee comes nearer than g = KNEE_STOP to straight or folded: for both
+    sides, with l and m the links at the knee, the larger of
+
+        l + m - sqrt(l^2 + m^2 + 2 l m cos g)   and   sqrt(l^2 + m^2 - 2 l m cos g) - |l - m|
+
+    but the first alone for l = m: such a side folds on its motor's axis, which is no edge.
+
+    Args:
+        leg: The leg; L6 = 0.
+    """
+    margins: list[float] = []
+    for near, far in ((leg.L1, leg.L2), (leg.L4, leg.L3)):
+        square, product = near**2 + far**2, 2.0 * near * far * np.cos(KNEE_STOP)
+        margins.append(near + far - np.sqrt(square + product))
+        if near != far:
+            margins.append(np.sqrt(square - product) - abs(near - far))
+    return float(max(margins))
+
+
+def rates(values: Array, timestep: float) -> tuple[Array, Array]:
+    """Return first and second rates of sampled values by central differences.
+
+        v_k = (p_k+1 - p_k-1) / 2h,   a_k = (p_k+1 - 2 p_k + p_k-1) / h^2
+
+    At the first and the last row the values go on straight: the one-sided difference, and 0.
+
+    Args:
+        values: p at steps of h, (N + 1, n).
+        timestep: h [s].
+    """
+    before, after = 2.0 * values[:1] - values[1:2], 2.0 * values[-1:] - values[-2:-1]
+    p = np.concatenate([before, values, after])
+    return (p[2:] - p[:-2]) / (2.0 * timestep), np.diff(p, 2, axis=0) / timestep**2
+
+
+def _projected(leg: FiveBar, wanted: Sample, time: Array) -> Sample:
+    """Return the targets with those out of reach replaced; the same object if there are none."""
+    targets = wanted.position
+    if leg.L6 > 0.0:
+        if workspace.reachable(leg, targets, mode=leg.mode).all():
+            return wanted
+        raise ArgumentError(f'outside = "nearest" needs a leg with L6 = 0, got {leg.L6:g} m')
+    foot = workspace.nearest(leg, targets, margin=edge_margin(leg), mode=leg.mode)
+    if np.array_equal(foot, targets):
+        return wanted
+    moved, fastest = _lengths(np.diff(foot, axis=0)), _lengths(np.diff(targets, axis=0)).max()
+    jumps = np.concatenate([[False], moved > FASTEST_SLIDE * fastest])
+    what = f"moves the nearest reachable point more than {FASTEST_SLIDE:g} times as fast as itself"
+    _refuse(jumps, foot, time, what)
+    return Sample(foot, *rates(foot, float(time[1])))
+
+
+def _lengths(vectors: Array) -> Array:
+    return np.hypot(vectors[:, 0], vectors[:, 1])
 
 
 def _continuous(rest: Array, q: Array) -> Array:

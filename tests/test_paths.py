@@ -189,12 +189,14 @@ def test_line_rests_at_both_ends() -> None:
 
 
 def test_kinds_decode_by_name_without_scipy() -> None:
-    assert sorted(KINDS) == ["circle", "csv", "ellipse", "figure-eight", "line"]
+    periodic = ["circle", "csv", "ellipse", "figure-eight", "gait", "hop", "line"]
+    assert sorted(KINDS) == sorted([*periodic, "lines", "step"])
     for name, path in SHAPES.items():
         spec = msgspec.to_builtins(path)
         assert spec["kind"] == name
         assert msgspec.convert(spec, PathSpec) == path
         assert path.resolve(Path()) is path
+        assert (path.rest, path.needs_ground, path.outside) == (math.inf, False, "refuse")
     lazy = (
         "import sys, fivebar_sim.paths; sys.exit('scipy' in sys.modules or 'mujoco' in sys.modules)"
     )
@@ -216,6 +218,7 @@ ELLIPSE = {"kind": "ellipse", "centre": [0.0, -0.07], "radii": [0.02, 0.008], "f
         ({"frequency": math.inf}, "frequency must be in (0, 1e+06) Hz, got inf"),
         ({"ramp": -0.1}, "ramp must be in [0, inf) s, got -0.1"),
         ({"ramp": math.nan}, "ramp must be in [0, inf) s, got nan"),
+        ({"outside": "clamp"}, "Invalid enum value 'clamp' - at `$[...].outside`"),
         ({"radius": 1.0}, "Object contains unknown field `radius`"),
         ({"kind": "elipse"}, "Invalid value 'elipse'"),
         ({"kind": "csv"}, "Object contains unknown field"),

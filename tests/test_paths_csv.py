@@ -143,7 +143,7 @@ HEAD = "# note\ntime_s,x_m,z_m\n0,0,0\n"
             HEAD + "#\n0,0,0\n",
             ", line 5: times are repeated: time_s must be > 0.0 s of line 3",
         ),
-        (HEAD, ": a path needs at least 2 rows, or 3 distinct ones if periodic, got 1"),
+        (HEAD, ": a foot path needs at least 2 rows, got 1"),
         (b"# a\n# \xe9t\xe9\n", ", line 2: must be UTF-8, got byte 0xe9"),
     ],
 )

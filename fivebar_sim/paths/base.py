@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import NamedTuple, Self
+from typing import ClassVar, Literal, NamedTuple, Self
 
 import msgspec
 import numpy as np
@@ -23,6 +23,11 @@ FARTHEST = 1e3
 
 FASTEST = 1e6
 """Upper end of frequencies [Hz]."""
+
+LONGEST = 1e6
+"""Upper end of durations [s]: eleven days."""
+
+Pair = tuple[float, float]
 
 
 class Sample(NamedTuple):
@@ -44,14 +49,20 @@ class FootPath(
 ):
     """A foot path p(t), begun from rest.
 
-    A kind of path overrides `nominal`, the path at its own time, and `period` if it repeats, or
-    `end` if it stops.
+    A kind of path overrides `nominal`, the path at its own time, and `period` if it repeats, `end`
+    if it stops, or `rest` if it ends in a hold.
 
     Attributes:
+        needs_ground: Whether the path means nothing without a ground under the foot.
         ramp: How long the path takes to reach its own speed, from rest [s]; 0 starts at speed.
+        outside: What becomes of targets that the leg cannot reach: "refuse" the path, or go to the
+            "nearest" point that it reaches; see `motion.plan`.
     """
 
+    needs_ground: ClassVar[bool] = False
+
     ramp: float = 0.25
+    outside: Literal["refuse", "nearest"] = "refuse"
 
     def __post_init__(self) -> None:
         check_number("ramp", self.ramp, "s", low=0.0)
@@ -64,6 +75,11 @@ class FootPath(
     @property
     def end(self) -> float:
         """Last time at which the path is defined [s]; inf if it goes on for ever."""
+        return math.inf
+
+    @property
+    def rest(self) -> float:
+        """Time from which the foot is held for ever [s]; inf if it never is."""
         return math.inf
 
     def nominal(self, time: ArrayLike) -> Sample:
@@ -120,16 +136,48 @@ class FootPath(
 
     def _times(self, time: ArrayLike) -> Array:
         """Return times as an array [s], those past the end by rounding set to the end."""
-        try:
-            t = np.asarray(time, dtype=np.float64)
-        except (TypeError, ValueError) as error:
-            raise ArgumentError(f"time must be numbers [s]: {error}") from None
-        bad = ~((t >= 0.0) & (t <= self.end * (1.0 + TIME_ROUNDING)) & (t < math.inf))
-        if bad.any():
-            i = first_index(bad)
-            limits = "[0, inf)" if self.end == math.inf else f"[0, {self.end:.9g}]"
-            raise ArgumentError(f"time must be in {limits} s, got {float(t[i])!r} s{at(i)}")
-        return np.minimum(t, self.end)
+        return times(time, self.end)
+
+
+class Cyclic(FootPath, frozen=True):
+    """A path that repeats with a frequency.
+
+    Attributes:
+        frequency: [Hz].
+    """
+
+    frequency: float
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        check_number("frequency", self.frequency, "Hz", low=0.0, high=FASTEST, strict=True)
+
+    @property
+    def period(self) -> float:
+        """1 / frequency [s]."""
+        return 1.0 / self.frequency
+
+
+def times(time: ArrayLike, end: float) -> Array:
+    """Return times as an array [s], those past the end by rounding set to the end.
+
+    Args:
+        time: [s], shape (...).
+        end: Last legal time [s]; may be inf.
+
+    Raises:
+        ArgumentError: Unless every time is a finite number in [0, end].
+    """
+    try:
+        t = np.asarray(time, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise ArgumentError(f"time must be numbers [s]: {error}") from None
+    bad = ~((t >= 0.0) & (t <= end * (1.0 + TIME_ROUNDING)) & (t < math.inf))
+    if bad.any():
+        i = first_index(bad)
+        limits = "[0, inf)" if end == math.inf else f"[0, {end:.9g}]"
+        raise ArgumentError(f"time must be in {limits} s, got {float(t[i])!r} s{at(i)}")
+    return np.minimum(t, end)
 
 
 def eased(time: Array, ramp: float) -> tuple[Array, Array, Array]:
@@ -151,16 +199,45 @@ def eased(time: Array, ramp: float) -> tuple[Array, Array, Array]:
     return s, s_dot, s_ddot
 
 
-def check_pair(path: FootPath, key: str, unit: str, *, positive: bool = False) -> None:
-    """Raise unless a path's key is a pair of numbers; keep it as a tuple of floats.
+def check_ramp(path: FootPath) -> None:
+    """Raise unless the ramp is over when the path comes to rest: else it would rest later.
 
     Raises:
-        ArgumentError: With a message that starts with the key.
+        ArgumentError: Unless ramp <= rest.
     """
-    pair = getattr(path, key)
+    if not path.ramp <= path.rest:
+        raise ArgumentError(
+            f"ramp must be in [0, {path.rest:g}] s, the time that the path moves, got "
+            f"{path.ramp:g} s"
+        )
+
+
+def check_pair(
+    spec: msgspec.Struct, key: str, unit: str, *, high: float = FARTHEST, positive: bool = False
+) -> None:
+    """Raise unless a key of a frozen Struct is a pair of numbers; keep it as a tuple of floats.
+
+    Args:
+        spec: What has the key.
+        key: Its name; messages start with it.
+        unit: Of both numbers, for messages.
+        high: Upper end of their size.
+        positive: Whether both must be above 0.
+
+    Raises:
+        ArgumentError: Not two numbers, or one out of range.
+    """
+    pair = pair_of(key, getattr(spec, key), unit, high=high, positive=positive)
+    msgspec.structs.force_setattr(spec, key, pair)
+
+
+def pair_of(
+    key: str, pair: object, unit: str, *, high: float = FARTHEST, positive: bool = False
+) -> Pair:
+    """Return a pair of numbers as a tuple of floats; see `check_pair`."""
     if not (isinstance(pair, (tuple, list)) and len(pair) == 2):
         raise ArgumentError(f"{key} must be two numbers [{unit}], got {pair!r}")
+    low = 0.0 if positive else -high
     for index, value in enumerate(pair):
-        low = 0.0 if positive else -FARTHEST
-        check_number(f"{key}[{index}]", value, unit, low=low, high=FARTHEST, strict=positive)
-    msgspec.structs.force_setattr(path, key, tuple(map(float, pair)))
+        check_number(f"{key}[{index}]", value, unit, low=low, high=high, strict=positive)
+    return float(pair[0]), float(pair[1])

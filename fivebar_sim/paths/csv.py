@@ -15,44 +15,15 @@ import msgspec
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fivebar_sim.arrays import Array
-from fivebar_sim.errors import ArgumentError, ConfigError, unknown
+from fivebar_sim.errors import ArgumentError, ConfigError
 from fivebar_sim.paths.base import TIME_ROUNDING, FootPath, Sample, check_number
+from fivebar_sim.paths.track import Track, read_track
 
 if TYPE_CHECKING:
     from scipy.interpolate import CubicSpline
 
 HEADERS = {("time_s", "x_mm", "z_mm"): 1e-3, ("time_s", "x_m", "z_m"): 1.0}
 """The legal headers, each with the length of its unit [m]."""
-
-SAME_POINT = 1e-9
-"""Two points this close are one: the last point repeats the first [m]."""
-
-
-LARGEST = 1e6
-"""Upper end of numbers in a CSV: a kilometre in mm, eleven days in s."""
-
-
-class Track(NamedTuple):
-    """The points of a CSV file.
-
-    Attributes:
-        time: Strictly growing from 0 [s], shape (n,).
-        foot: Hip frame (x, z) [m], shape (n, 2).
-    """
-
-    time: Array
-    foot: Array
-
-    @property
-    def span(self) -> float:
-        """Last time minus first [s]."""
-        return float(self.time[-1])
-
-    @property
-    def closed(self) -> bool:
-        """Whether the last point repeats the first."""
-        return bool(np.max(np.abs(self.foot[-1] - self.foot[0])) <= SAME_POINT)
 
 
 class _Curve(NamedTuple):
@@ -128,7 +99,7 @@ class Csv(FootPath, frozen=True, tag="csv", dict=True):
     def _curve(self) -> _Curve:
         from scipy.interpolate import CubicSpline  # slow to import, and only this kind needs it
 
-        track = read_track(Path(self.file))
+        track = read_track(Path(self.file), HEADERS, "foot path")
         if not self.periodic:
             if not self.ramp <= track.span:
                 raise ConfigError(
@@ -160,92 +131,3 @@ def _closed(track: Track, period: float | None, where: str) -> Track:
             f"{where}: period must be {relation} {span:.9g} s, the sampled span, got {period:.9g} s"
         )
     return Track(np.append(time, period), np.concatenate([foot, foot[:1]]))
-
-
-def read_track(file: Path) -> Track:
-    """Return the points of a CSV file, in m and from t = 0.
-
-    Raises:
-        ConfigError: The file cannot be read, is not UTF-8, has another header, a row with the wrong
-            number of cells, a cell that is no finite number, times that do not grow, or one row.
-    """
-    lines = _lines(file)
-    if not lines:
-        raise ConfigError(f"{file}: no header; {_legal_headers()}")
-    (number, header), *rows = lines
-    order, scale = _columns(header, f"{file}, line {number}")
-    table = np.empty((len(rows), 3))
-    for k, (number, cells) in enumerate(rows):
-        where = f"{file}, line {number}"
-        if len(cells) != len(header):
-            raise ConfigError(
-                f"{where}: a row must have {len(header)} cells ({','.join(header)}), got "
-                f"{len(cells)}"
-            )
-        table[k] = [_number(cells[i], header[i], where) for i in order]
-        if k > 0 and not table[k, 0] > table[k - 1, 0]:
-            word = "repeated" if table[k, 0] == table[k - 1, 0] else "not sorted"
-            raise ConfigError(
-                f"{where}: times are {word}: time_s must be > {float(table[k - 1, 0])!r} s of line "
-                f"{rows[k - 1][0]}, got {float(table[k, 0])!r} s"
-            )
-    if len(rows) < 2:
-        raise ConfigError(
-            f"{file}: a path needs at least 2 rows, or 3 distinct ones if periodic, got {len(rows)}"
-        )
-    return Track(table[:, 0] - table[0, 0], scale * table[:, 1:])
-
-
-def _lines(file: Path) -> list[tuple[int, list[str]]]:
-    """Return the lines that are neither blank nor comments, as (line number, stripped cells)."""
-    try:
-        raw = file.read_bytes()
-    except OSError as error:
-        raise ConfigError(f"cannot read foot path {file}: {error.strerror}") from None
-    try:
-        text = raw.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        number = raw.count(b"\n", 0, error.start) + 1
-        byte = raw[error.start]
-        raise ConfigError(f"{file}, line {number}: must be UTF-8, got byte 0x{byte:02x}") from None
-    stripped = ((k, line.strip()) for k, line in enumerate(text.split("\n"), start=1))
-    return [
-        (k, [cell.strip() for cell in line.split(",")])
-        for k, line in stripped
-        if line and not line.startswith("#")
-    ]
-
-
-def _columns(header: list[str], where: str) -> tuple[list[int], float]:
-    """Return where time, x and z stand in a header, and the length of its unit [m]."""
-    for legal, scale in HEADERS.items():
-        if sorted(header) == sorted(legal):
-            return [header.index(name) for name in legal], scale
-    known = {name for legal in HEADERS for name in legal}
-    nearest = max(HEADERS, key=lambda legal: len(set(legal) & set(header)))
-    strange = [name for name in header if name not in known]
-    missing = [name for name in nearest if name not in header]
-    if strange:
-        problem = unknown("column", strange[0], known)
-    elif missing:
-        problem = f"no column {missing[0]!r}"
-    else:
-        problem = "too many columns"
-    raise ConfigError(f"{where}: {problem}; {_legal_headers()}, got {','.join(header)!r}")
-
-
-def _legal_headers() -> str:
-    names = " or ".join(",".join(legal) for legal in HEADERS)
-    return f"the header must be {names}, in any order"
-
-
-def _number(cell: str, column: str, where: str) -> float:
-    """Return a cell as a finite number."""
-    try:
-        value = math.nan if "_" in cell else float(cell)
-    except ValueError:
-        value = math.nan
-    if not abs(value) <= LARGEST:
-        legal = f"[{-LARGEST:g}, {LARGEST:g}]"
-        raise ConfigError(f"{where}: {column} must be a number in {legal}, got {cell!r}")
-    return value

@@ -9,28 +9,11 @@ from numpy.typing import ArrayLike
 
 from fivebar_sim.arrays import Array
 from fivebar_sim.checks import check_number
-from fivebar_sim.paths.base import FARTHEST, FASTEST, FootPath, Sample, check_pair
-
-Pair = tuple[float, float]
+from fivebar_sim.paths.base import FARTHEST, Cyclic, Pair, Sample, check_pair
 
 
-class _Cyclic(FootPath, frozen=True):
-    """A path that repeats with a frequency.
-
-    Attributes:
-        frequency: [Hz].
-    """
-
-    frequency: float
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        check_number("frequency", self.frequency, "Hz", low=0.0, high=FASTEST, strict=True)
-
-    @property
-    def period(self) -> float:
-        """1 / frequency [s]."""
-        return 1.0 / self.frequency
+class _Harmonic(Cyclic, frozen=True):
+    """A path of sines and cosines."""
 
     @property
     def omega(self) -> float:
@@ -38,7 +21,7 @@ class _Cyclic(FootPath, frozen=True):
         return 2.0 * math.pi * self.frequency
 
 
-class Ellipse(_Cyclic, frozen=True, tag="ellipse"):
+class Ellipse(_Harmonic, frozen=True, tag="ellipse"):
     """An upright ellipse, from its lowest point towards +x; see `nominal`.
 
     Attributes:
@@ -59,7 +42,7 @@ class Ellipse(_Cyclic, frozen=True, tag="ellipse"):
         return _orbit(self.centre, self.radii, self.omega, self._times(time))
 
 
-class Circle(_Cyclic, frozen=True, tag="circle"):
+class Circle(_Harmonic, frozen=True, tag="circle"):
     """A circle, from its lowest point towards +x; see `nominal`.
 
     Attributes:
@@ -80,7 +63,7 @@ class Circle(_Cyclic, frozen=True, tag="circle"):
         return _orbit(self.centre, (self.radius, self.radius), self.omega, self._times(time))
 
 
-class Line(_Cyclic, frozen=True, tag="line"):
+class Line(Cyclic, frozen=True, tag="line"):
     """A straight line there and back, at rest at both ends; see `nominal`.
 
     Attributes:
@@ -117,7 +100,7 @@ class Line(_Cyclic, frozen=True, tag="line"):
         return Sample(position, span * dh * tau_dot, span * ddh * tau_dot**2)
 
 
-class FigureEight(_Cyclic, frozen=True, tag="figure-eight"):
+class FigureEight(_Harmonic, frozen=True, tag="figure-eight"):
     """A lying eight, 2 rx wide and 2 rz high, from its crossing towards +x, +z; see `nominal`.
 
     Attributes:

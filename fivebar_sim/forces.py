@@ -1,0 +1,167 @@
+"""Foot forces: what the world does to the foot over time, F(t) in the hip frame.
+
+A profile is a frozen table of numbers with a `kind`; `profile.at(time, path)` is the force.
+"""
+
+from __future__ import annotations
+
+import math
+from functools import cached_property
+from pathlib import Path
+from typing import Self, get_args
+
+import msgspec
+import numpy as np
+from numpy.typing import ArrayLike
+
+from fivebar_sim.arrays import Array
+from fivebar_sim.errors import ArgumentError
+from fivebar_sim.paths import FootPath, Gait
+from fivebar_sim.paths.base import Pair, check_pair, times
+from fivebar_sim.paths.track import Track, read_track
+
+__all__ = ["KINDS", "Constant", "Csv", "FootForce", "ForceSpec", "Stance"]
+
+STRONGEST = 1e6
+"""Upper end of forces [N]."""
+
+HEADERS = {("time_s", "x_N", "z_N"): 1.0}
+"""The legal header of a CSV, with the size of its unit [N]."""
+
+
+class FootForce(
+    msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True, tag_field="kind"
+):
+    """A force on the foot over time; a kind of it overrides `at`, and `end` if it stops."""
+
+    @property
+    def end(self) -> float:
+        """Last time at which the force is defined [s]; inf if it goes on for ever."""
+        return math.inf
+
+    def at(self, time: ArrayLike, path: FootPath) -> Array:
+        """Return what the world does to the foot.
+
+        Args:
+            time: [s], shape (...).
+            path: What the foot is meant to do at that time.
+
+        Returns:
+            (Fx, Fz) [N] in the hip frame, shape (..., 2).
+
+        Raises:
+            ArgumentError: Unless every time is in [0, end], or a path without what the kind needs.
+        """
+        raise NotImplementedError
+
+    def resolve(self, folder: Path) -> Self:
+        """Return the force with its files read and checked; names are relative to folder.
+
+        Raises:
+            ConfigError: A file that cannot be read or says something illegal.
+        """
+        del folder  # only the kinds that read a file need it
+        return self
+
+
+class Constant(FootForce, frozen=True, tag="constant"):
+    """The same force at all times.
+
+    Attributes:
+        value: (Fx, Fz) [N].
+    """
+
+    value: Pair
+
+    def __post_init__(self) -> None:
+        check_pair(self, "value", "N", high=STRONGEST)
+
+    def at(self, time: ArrayLike, path: FootPath) -> Array:
+        """Return F = value; see `FootForce.at`."""
+        del path
+        return np.full((*times(time, self.end).shape, 2), self.value)
+
+
+class Stance(FootForce, frozen=True, tag="stance"):
+    """A half sine over each planned stance of a gait path, and nothing in its swing.
+
+    Attributes:
+        peak: (Fx, Fz) in the middle of the stance [N].
+    """
+
+    peak: Pair
+
+    def __post_init__(self) -> None:
+        check_pair(self, "peak", "N", high=STRONGEST)
+
+    def at(self, time: ArrayLike, path: FootPath) -> Array:
+        """Return the force; see `FootForce.at`.
+
+            F = peak sin(pi c / duty) for c < duty,   F = 0 from there on
+
+        with c = path.cycle(time), the planned touch-down at c = 0, which keeps to the path's ramp.
+
+        Raises:
+            ArgumentError: A path other than a gait: it has no stance.
+        """
+        if not isinstance(path, Gait):
+            raise ArgumentError(
+                'a force of kind "stance" needs a path of kind "gait", got '
+                f'"{path.__struct_config__.tag}"'
+            )
+        cycle = path.cycle(time)
+        sine = np.where(cycle < path.duty, np.sin(np.pi * cycle / path.duty), 0.0)
+        return sine[..., None] * np.array(self.peak)
+
+
+class Csv(FootForce, frozen=True, tag="csv", dict=True):
+    """Straight lines between the rows of a CSV file, whose first time becomes t = 0.
+
+    The header is `time_s,x_N,z_N`, columns in any order; lines that start with # are comments. The
+    file is read when first needed, once per object; `resolve` reads it at once.
+
+    Attributes:
+        file: Name of the CSV, relative to the scenario's folder (unresolved: the current one).
+    """
+
+    file: str
+
+    def __post_init__(self) -> None:
+        if not self.file or "\0" in self.file:
+            raise ArgumentError(f"file must be the name of a CSV file, got {self.file!r}")
+
+    @property
+    def end(self) -> float:
+        """The sampled span [s]."""
+        return self._track.span
+
+    def at(self, time: ArrayLike, path: FootPath) -> Array:
+        """Return the line between the two rows around each time; see `FootForce.at`.
+
+        Raises:
+            ArgumentError: Unless every time is in [0, end].
+            ConfigError: What `resolve` would raise, if the file was not read yet.
+        """
+        del path
+        t, track = times(time, self.end), self._track
+        return np.stack([np.interp(t, track.time, F) for F in track.pair.T], axis=-1)
+
+    def resolve(self, folder: Path) -> Self:
+        """Return the force bound to the file in folder, read and checked.
+
+        Raises:
+            ConfigError: The file cannot be read, or a line of it is illegal; gives its number.
+        """
+        bound = msgspec.structs.replace(self, file=str((folder / self.file).absolute()))
+        _ = bound._track
+        return bound
+
+    @cached_property
+    def _track(self) -> Track:
+        return read_track(Path(self.file), HEADERS, "foot force")
+
+
+ForceSpec = Constant | Csv | Stance
+KINDS: dict[str, type[FootForce]] = {
+    str(kind.__struct_config__.tag): kind for kind in get_args(ForceSpec)
+}

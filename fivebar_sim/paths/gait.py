@@ -1,0 +1,113 @@
+"""The foot path of a walking or trotting leg: a straight stance on the ground, a swing above it."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from fivebar_sim.arrays import Array, Bools
+from fivebar_sim.checks import check_number
+from fivebar_sim.paths.base import FARTHEST, Cyclic, Pair, Sample, check_pair, eased
+from fivebar_sim.paths.quintic import STEEPEST, arch, pieces
+
+
+class Gait(Cyclic, frozen=True, tag="gait"):
+    """Stance and swing of one leg, in the hip frame, begun in the middle of the stance.
+
+    The foot stands for the fraction duty of each period: it goes straight back along x at
+    `stance_speed`, as a ground does under a body that moves forward. Then it swings back to the
+    front; see `nominal`.
+
+    Within the ramp all speeds are those of `FootPath.at`, s' times the nominal ones: the stance
+    speed rises from 0, passes its nominal value at ramp / 3, peaks at 1.512 times that, and is back
+    at t = ramp. A belt that runs at the constant `stance_speed` slips against the foot until then.
+    With ramp <= duty / (2 frequency) all of it happens in the first stance.
+
+    Attributes:
+        centre: (x, z) of the middle of the stance line [m]; z is that of the ground.
+        stride: Length of the stance line [m]: the body moves on by stride / duty in each period.
+            Negative walks towards -x; 0 steps on the spot.
+        lift: Height of the swing above the ground [m].
+        duty: Duty factor: the part of a period that is stance, in (0, 1).
+        touchdown: Downward speed of the foot at the end of the swing [m/s].
+    """
+
+    centre: Pair
+    stride: float
+    lift: float
+    duty: float = 0.5
+    touchdown: float = 0.0
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        check_pair(self, "centre", "m")
+        check_number("stride", self.stride, "m", low=-FARTHEST, high=FARTHEST)
+        check_number("lift", self.lift, "m", low=0.0, high=FARTHEST, strict=True)
+        check_number("duty", self.duty, "", low=0.0, high=1.0, strict=True)
+        check_number("touchdown", self.touchdown, "m/s", low=0.0, high=self.fastest_touchdown)
+
+    @property
+    def stance_speed(self) -> float:
+        """Speed of the ground under the foot towards -x, stride frequency / duty [m/s]."""
+        return self.stride * self.frequency / self.duty
+
+    @property
+    def fastest_touchdown(self) -> float:
+        """Greatest touchdown [m/s], 6 lift frequency / (1 - duty): above, the swing passes lift."""
+        return STEEPEST * self.lift * self.frequency / (0.5 * (1.0 - self.duty))
+
+    def cycle(self, time: ArrayLike) -> Array:
+        """Return the time since the planned touch-down, in periods, eased as in `FootPath.at`.
+
+        Args:
+            time: [s], shape (...).
+
+        Returns:
+            In [0, 1), shape (...): stance below duty, swing from there on.
+
+        Raises:
+            ArgumentError: Unless every time is in [0, inf).
+        """
+        return self._cycle(eased(self._times(time), self.ramp)[0])
+
+    def in_stance(self, time: ArrayLike) -> Bools:
+        """Return whether the foot is planned to stand, from touch-down until before lift-off.
+
+        Args:
+            time: [s], shape (...).
+
+        Raises:
+            ArgumentError: Unless every time is in [0, inf).
+        """
+        return np.asarray(self.cycle(time) < self.duty)
+
+    def nominal(self, time: ArrayLike) -> Sample:
+        """Return stance and swing and their rates; see `FootPath.nominal`.
+
+        With c the cycle since touch-down, v = stance_speed, and T = (1 - duty) / frequency:
+
+            stance, c < duty:   x = cx + stride (1/2 - c / duty),   z = cz
+            swing, c >= duty:   x: a quintic from cx - stride/2 to cx + stride/2, x' = -v, x'' = 0
+                                at both ends;   z: the `arch` of lift, up and down in T/2 each
+
+        Position, velocity and acceleration are continuous, in and between the pieces, but for one:
+        at touch-down z' jumps from -touchdown to 0, since the ground stops the foot; the value at
+        that instant is 0. The foot overshoots the stance line at both ends of the swing, as it must
+        turn round.
+        """
+        cycle = self._cycle(self._times(time))
+        duty, half = self.duty, 0.5 * self.stride
+        stands, swing = cycle < duty, np.maximum(cycle, duty)
+        (cx, cz), slope = self.centre, -self.stride / duty
+        x, dx, ddx = pieces([(duty, cx - half, slope, 0.0), (1.0, cx + half, slope, 0.0)], swing)
+        z, dz, ddz = pieces(arch(duty, 1.0, cz, self.lift, self.touchdown * self.period), swing)
+        x = np.where(stands, cx + half + slope * cycle, x)
+        dx, ddx = np.where(stands, slope, dx), np.where(stands, 0.0, ddx)
+        return Sample(
+            position=np.stack([x, z], axis=-1),
+            velocity=self.frequency * np.stack([dx, dz], axis=-1),
+            acceleration=self.frequency**2 * np.stack([ddx, ddz], axis=-1),
+        )
+
+    def _cycle(self, time: Array) -> Array:
+        return np.mod(time * self.frequency + 0.5 * self.duty, 1.0)
