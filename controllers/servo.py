@@ -7,11 +7,15 @@ from typing import Literal
 import msgspec
 import numpy as np
 
+from fivebar_sim import dynamics
 from fivebar_sim.arrays import Array
 from fivebar_sim.geometry import FiveBar
 from fivebar_sim.motion import Motion
 from fivebar_sim.servo import Integrator
 from fivebar_sim.servo import Servo as ServoGains
+
+MOTORS = [0, 2]
+"""A and E among the joints A, B, E, D."""
 
 
 class Servo(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -19,29 +23,46 @@ class Servo(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
 
         feedforward "none":      u = theta*
         feedforward "velocity":  u = theta* + (kd / kp) theta_dot*
+        feedforward "torque":    u = theta* + (kd / kp) theta_dot* + tau* / kp
 
     A servo tau = kp (u - theta) - kd theta_dot trails a moving setpoint by kd / kp times its
-    speed; the second law takes that lag out, and leaves tau / kp.
+    speed; the second law takes that lag out, and leaves tau / kp. The third takes out that too:
+    tau* is what the motion takes, with the motion's payload and foot force and the gears'
+    friction. kd is all damping of the motor's joint, a no-load speed's share included.
 
-    Both are written in the terms of the integrator's step from t to t + h. Theta* is taken at
+    All are written in the terms of the integrator's step from t to t + h. Theta* is taken at
     t + h with `discrete`, whose spring acts there, and at t with `implicitfast`. Theta_dot* is
     what the rate will be after the step if the leg follows, (theta*(t + h) - theta*(t)) / h under
     both: the damping acts on that rate, and the path's own rate at t + h is half a step ahead.
+    Tau* is `dynamics.step_torques`. Under `implicitfast` the loop opens by tens of micrometres:
+    the third law follows `dynamics.soft_loop`, which keeps the foot on its path nevertheless.
 
     Attributes:
-        feedforward: "none" or "velocity".
+        feedforward: "none", "velocity" or "torque".
     """
 
-    feedforward: Literal["none", "velocity"] = "none"
+    feedforward: Literal["none", "velocity", "torque"] = "none"
 
     def setpoints(
         self, leg: FiveBar, servo: ServoGains, motion: Motion, integrator: Integrator
     ) -> Array:
-        """Return the setpoints (theta_A, theta_E) of every step [rad], (N, 2)."""
-        del leg  # what the law needs of it is in the motion
+        """Return the setpoints (theta_A, theta_E) of every step [rad], (N, 2).
+
+        Raises:
+            SingularError, DivergedError: With "torque", where the loop of `implicitfast` cannot
+                follow the motion; see `dynamics.soft_loop`.
+        """
+        q, h, payload = motion.q, motion.timestep, motion.payload
+        if self.feedforward == "torque" and integrator == "implicitfast":
+            q = dynamics.soft_loop(leg, q, h, servo.damping, payload=payload)
         rows = slice(1, None) if integrator == "discrete" else slice(None, -1)
-        u = motion.q[rows][:, [0, 2]]
-        if self.feedforward == "velocity":
-            rate = np.diff(motion.q[:, [0, 2]], axis=0) / motion.timestep
-            u = u + (servo.kd / servo.kp) * rate
+        u = q[rows][:, MOTORS]
+        if self.feedforward != "none":
+            rate = np.diff(q[:, MOTORS], axis=0) / h
+            u = u + (servo.damping / servo.kp) * rate
+        if self.feedforward == "torque":
+            tau = dynamics.step_torques(
+                leg, q, h, motion.force[:-1], payload=payload, friction=servo.friction
+            )
+            u = u + tau / servo.kp
         return u

@@ -4,8 +4,8 @@ Angle pairs are theta = (theta_A, theta_E), torques tau = (tau_A, tau_E), (..., 
 
     tau = M(theta) theta_ddot + bias(theta, theta_dot) - J^T F
 
-F is what the world does to the foot. Weight and motor armature are in, friction is not: a torque
-law may have it.
+F is what the world does to the foot. Weight and motor armature are in; `inverse`, `forward` and
+`step_torques` add the Coulomb friction of the gears, and a torque law may have any other.
 """
 
 from fivebar_sim.dynamics.laws import (
@@ -19,6 +19,7 @@ from fivebar_sim.dynamics.laws import (
     statics,
 )
 from fivebar_sim.dynamics.motion import Law, Motion, integrate, simulate
+from fivebar_sim.dynamics.stepwise import soft_loop, step_torques
 
 __all__ = [
     "Energy",
@@ -32,5 +33,7 @@ __all__ = [
     "mass_matrix",
     "reflected_inertia",
     "simulate",
+    "soft_loop",
     "statics",
+    "step_torques",
 ]

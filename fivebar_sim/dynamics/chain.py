@@ -37,6 +37,9 @@ Scalar = Any
 Vector = tuple[Scalar, Scalar]
 """(x, z), or (along, across) in a link's own frame."""
 
+Four = tuple[Scalar, Scalar, Scalar, Scalar]
+"""Of the links L1..L4."""
+
 
 def cross(a: Vector, b: Vector) -> Scalar:
     """Return a_x b_z - a_z b_x."""
@@ -169,7 +172,14 @@ class Chain:
         across = self.assembly * np.sqrt(area) / (2.0 * d2)
         BC = along * x - across * z, along * z + across * x
         e2 = BC[0] / L2, BC[1] / L2
-        e3 = (BC[0] - x) / L3, (BC[1] - z) / L3
+        return self.coupled(e1, e2, ((BC[0] - x) / L3, (BC[1] - z) / L3), e4)
+
+    def coupled(self, e1: Vector, e2: Vector, e3: Vector, e4: Vector) -> Pose:
+        """Return the pose of the links' directions; e2 and e3 must not be in line.
+
+        G is the null space of the gap's Jacobian, so it is right also where the loop is open.
+        """
+        L1, L2, L3, L4 = self.leg.L1, self.leg.L2, self.leg.L3, self.leg.L4
         s = cross(e2, e3)
         a2, b2 = -L1 * cross(e1, e3) / (L2 * s), L4 * cross(e4, e3) / (L2 * s)
         a3, b3 = -L1 * cross(e1, e2) / (L3 * s), L4 * cross(e4, e2) / (L3 * s)
@@ -190,13 +200,33 @@ class Chain:
             self.I4 + 2.0 * H43 * p.b3 + I3 * p.b3 * p.b3 + I2 * p.b2 * p.b2,
         )
 
+    def link_torques(self, p: Pose, w: Four, alpha: Four) -> Four:
+        """Return H psi_ddot + c - Q of links 1..4 [N m] at any rates w and accelerations alpha.
+
+        H = I on the diagonal, with H12 and H43 off it
+        c1 = -X12 w2^2,  c2 = X12 w1^2,   X12 = L1 e1 x r2    (4, 3 likewise)
+        Q_k = r_k x gravity
+        """
+        (w1, w2, w3, w4), gravity = w, self.leg.gravity
+        H12, H43 = self.couplings(p)
+        r1, r2, r3, r4 = self.moments(p)
+        X12, X43 = self.leg.L1 * cross(p.e1, r2), self.leg.L4 * cross(p.e4, r3)
+        return (
+            self.I1 * alpha[0] + H12 * alpha[1] - X12 * w2 * w2 - cross(r1, gravity),
+            H12 * alpha[0] + self.I2 * alpha[1] + X12 * w1 * w1 - cross(r2, gravity),
+            H43 * alpha[3] + self.I3 * alpha[2] + X43 * w4 * w4 - cross(r3, gravity),
+            self.I4 * alpha[3] + H43 * alpha[2] - X43 * w3 * w3 - cross(r4, gravity),
+        )
+
+    def at_motors(self, p: Pose, t: Four) -> Vector:
+        """Return the motor torques G^T t [N m] of link torques: the force in C cancels."""
+        return t[0] + p.a2 * t[1] + p.a3 * t[2], t[3] + p.b2 * t[1] + p.b3 * t[2]
+
     def bias(self, p: Pose, w1: Scalar, w4: Scalar) -> Vector:
         """Return G^T (H g + c - Q) [N m] at motor rates w1 and w4 [rad/s].
 
         g2 = k . e3 / (L2 e2 x e3),   g3 = k . e2 / (L3 e2 x e3)
         k = L1 w1^2 e1 + L2 w2^2 e2 - L4 w4^2 e4 - L3 w3^2 e3
-        c1 = -X12 w2^2,  c2 = X12 w1^2,   X12 = L1 e1 x r2    (4, 3 likewise)
-        Q_k = r_k x gravity
         """
         leg = self.leg
         w2, w3 = p.a2 * w1 + p.b2 * w4, p.a3 * w1 + p.b3 * w4
@@ -207,15 +237,7 @@ class Chain:
         )
         s = cross(p.e2, p.e3)
         g2, g3 = dot(k, p.e3) / (leg.L2 * s), dot(k, p.e2) / (leg.L3 * s)
-
-        H12, H43 = self.couplings(p)
-        r1, r2, r3, r4 = self.moments(p)
-        X12, X43 = leg.L1 * cross(p.e1, r2), leg.L4 * cross(p.e4, r3)
-        t1 = H12 * g2 - X12 * w2 * w2 - cross(r1, leg.gravity)
-        t2 = self.I2 * g2 + X12 * w1 * w1 - cross(r2, leg.gravity)
-        t3 = self.I3 * g3 + X43 * w4 * w4 - cross(r3, leg.gravity)
-        t4 = H43 * g3 - X43 * w3 * w3 - cross(r4, leg.gravity)
-        return t1 + p.a2 * t2 + p.a3 * t3, t4 + p.b2 * t2 + p.b3 * t3
+        return self.at_motors(p, self.link_torques(p, (w1, w2, w3, w4), (0.0, g2, g3, 0.0)))
 
     def moments(self, p: Pose) -> tuple[Vector, Vector, Vector, Vector]:
         """Return r1..r4, the moments S1..S4 in the hip frame [kg m]."""

@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 
 from fivebar_sim import kinematics
 from fivebar_sim.arrays import Array, as_pairs, at, finite, first_index, together
+from fivebar_sim.checks import check_number
 from fivebar_sim.dynamics.chain import Chain, Vector, cross, placed
 from fivebar_sim.errors import SingularError
 from fivebar_sim.geometry import FiveBar
@@ -36,12 +37,13 @@ def inverse(
     *,
     assembly: int | None = None,
     payload: float = 0.0,
+    friction: float = 0.0,
 ) -> Array:
     """Return the motor torques of a motion of the closed chain under a foot force.
 
-        tau = M theta_ddot + bias - J^T F
+        tau = M theta_ddot + bias - J^T F + friction sign(theta_dot)
 
-    At rest and without weight tau = -J^T F; with weight, at rest, it is what holds the leg.
+    At rest without weight tau = -J^T F, with weight what holds the leg: sticking is not modelled.
 
     Args:
         leg: The leg.
@@ -51,6 +53,7 @@ def inverse(
         foot_force: (x, z) that the world exerts on the foot F [N], broadcasts with theta; None: 0.
         assembly: +1 or -1; None is the leg's own.
         payload: Point mass at F [kg].
+        friction: Coulomb friction of each motor's gear [N m]; none at rest.
 
     Returns:
         (tau_A, tau_E) [N m], positive with the angles, the rotors' share included, (..., 2).
@@ -59,14 +62,13 @@ def inverse(
         LoopOpenError: Where the links do not meet.
         SingularError: Where B, C and D are in line.
         ArgumentError: Shapes that do not broadcast, numbers that are not finite, unknown
-            assembly, negative payload.
+            assembly, negative payload or friction.
     """
     chain = Chain.of(leg, assembly, payload)
+    check_number("friction", friction, "N m", low=0.0)
+    force = (0.0, 0.0) if foot_force is None else foot_force
     theta, w, alpha, F = _pairs(
-        theta=theta,
-        theta_dot=theta_dot,
-        theta_ddot=theta_ddot,
-        foot_force=(0.0, 0.0) if foot_force is None else foot_force,
+        theta=theta, theta_dot=theta_dot, theta_ddot=theta_ddot, foot_force=force
     )
     p = chain.pose(*_split(theta))
     M_AA, M_AE, M_EE = chain.mass(p)
@@ -74,7 +76,7 @@ def inverse(
     f_A, f_E = chain.foot_torques(p, _split(F))
     tau_A = M_AA * alpha[..., 0] + M_AE * alpha[..., 1] + h_A - f_A
     tau_E = M_AE * alpha[..., 0] + M_EE * alpha[..., 1] + h_E - f_E
-    return np.stack([tau_A, tau_E], axis=-1)
+    return np.stack([tau_A, tau_E], axis=-1) + friction * np.sign(w)
 
 
 def statics(
@@ -170,8 +172,11 @@ def forward(
     *,
     assembly: int | None = None,
     payload: float = 0.0,
+    friction: float = 0.0,
 ) -> Array:
-    """Return the motor accelerations under given torques: M^-1 (tau - bias + J^T F).
+    """Return the motor accelerations under given torques; `inverse` turned round.
+
+        theta_ddot = M^-1 (tau - friction sign(theta_dot) - bias + J^T F)
 
     Args:
         leg: The leg.
@@ -181,6 +186,7 @@ def forward(
         foot_force: (x, z) that the world exerts on the foot F [N], broadcasts with theta; None: 0.
         assembly: +1 or -1; None is the leg's own.
         payload: Point mass at F [kg].
+        friction: Coulomb friction of each motor's gear [N m]; none at rest.
 
     Returns:
         theta_ddot [rad/s^2], (..., 2).
@@ -191,10 +197,12 @@ def forward(
         ArgumentError: As `inverse`.
     """
     chain = Chain.of(leg, assembly, payload)
+    check_number("friction", friction, "N m", low=0.0)
     force = (0.0, 0.0) if foot_force is None else foot_force
     theta, w, tau, F = _pairs(theta=theta, theta_dot=theta_dot, tau=tau, foot_force=force)
     p = chain.pose(*_split(theta))
-    return np.stack(chain.accelerations(p, _split(w), _split(tau), _split(F)), axis=-1)
+    driven = _split(tau - friction * np.sign(w))
+    return np.stack(chain.accelerations(p, _split(w), driven, _split(F)), axis=-1)
 
 
 def energy(

@@ -1,0 +1,33 @@
+"""How stiffly MuJoCo's soft constraint closes the loop at C, by integrator."""
+
+from __future__ import annotations
+
+from fivebar_sim.servo import Integrator
+
+CONNECT = {
+    "discrete": ((1e-4, 1.0), (0.95, 0.99, 0.001)),
+    "implicitfast": ((2.0, 1.0), (0.9999, 0.9999, 0.001)),  # time constant in timesteps
+}
+"""solref and solimp of the loop's closure, by integrator; measured in docs/model.md."""
+
+
+def solref(integrator: Integrator, timestep: float) -> tuple[float, float]:
+    """Return the time constant [s] and the damping ratio of the loop's closure."""
+    timeconst, ratio = CONNECT[integrator][0]
+    return timeconst * timestep if integrator == "implicitfast" else timeconst, ratio
+
+
+def pull(timestep: float) -> tuple[float, float]:
+    """Return the stiffness k [1/s^2] and the drag b [1/s] of the loop under `implicitfast`.
+
+    The constraint asks for gap_ddot = -b gap_dot - k gap. With the time constant T, the damping
+    ratio z and the impedance d, the same for every gap under `implicitfast`:
+
+        k = 1 / (d T^2 z^2),   b = 2 / (d T)
+
+    See:
+        MuJoCo, Modeling, Solver parameters: k carries its impedance d here.
+    """
+    T, z = solref("implicitfast", timestep)
+    d = CONNECT["implicitfast"][1][1]
+    return 1.0 / (d * (T * z) ** 2), 2.0 / (d * T)
