@@ -27,10 +27,31 @@ SHOWN = {
     "load.torque_peak.E": ("torque E peak", 1e3, "mN m"),
     "load.share_A": ("load share A", 1e2, "%"),
     "load.thermal_share_A": ("thermal share A", 1e2, "%"),
+    "load.peak_ratio": ("peak torque ratio", 1.0, ""),
+    "load.rms_ratio": ("torque RMS ratio", 1.0, ""),
+    "load.work.A.positive": ("work A given", 1e3, "mJ"),
+    "load.work.A.negative": ("work A taken", 1e3, "mJ"),
+    "load.work.A.net": ("work A net", 1e3, "mJ"),
+    "load.work.E.positive": ("work E given", 1e3, "mJ"),
+    "load.work.E.negative": ("work E taken", 1e3, "mJ"),
+    "load.work.E.net": ("work E net", 1e3, "mJ"),
+    "load.opposing.fraction": ("motors opposed", 1e2, "%"),
+    "load.opposing.energy": ("energy motor to motor", 1e3, "mJ"),
+    "load.saturated.A": ("motor A saturated", 1e2, "%"),
+    "load.saturated.E": ("motor E saturated", 1e2, "%"),
+    "ground.force_max.x": ("ground force x max", 1.0, "N"),
+    "ground.force_max.z": ("ground force z max", 1.0, "N"),
+    "ground.stance_share": ("time in stance", 1e2, "%"),
+    "ground.slip": ("slip in stance", 1e3, "mm"),
+    "ground.foot_height_max": ("foot height max", 1e3, "mm"),
+    "ground.flight_max": ("longest flight", 1e3, "ms"),
     "branch.flips": ("branch flips", 1.0, ""),
     "warnings": ("MuJoCo warnings", 1.0, ""),
 }
 """What a metric is called, the factor from SI to the shown unit, and that unit."""
+
+DETAILS = ("load.work", "load.opposing", "load.peak_ratio", "load.rms_ratio", "load.saturated")
+"""Metrics that are shown only where they have a limit, or where motors saturate."""
 
 
 def shown(key: str, value: float | None) -> str:
@@ -61,6 +82,8 @@ def print_result(result: Result, where: str, console: Console) -> None:
     table = _table(escape(title), ("metric", "value", "limit", "verdict"))
     for key, (label, _, _) in SHOWN.items():
         limit = limits.get(key)
+        if key.split(".")[0] not in result.metrics or not (limit or _matters(key, result)):
+            continue
         judged = (bounds(limit), verdict(limit.ok)) if limit else ("", "")
         table.add_row(label, shown(key, look_up(result.metrics, key)), *judged)
     console.print(table)
@@ -70,6 +93,13 @@ def print_result(result: Result, where: str, console: Console) -> None:
     console.print(
         f"verdict: {verdict(result.verdict == 'pass')}   written to {escape(where)}", soft_wrap=True
     )
+
+
+def _matters(key: str, result: Result) -> bool:
+    """Return whether a metric without a limit is worth a line."""
+    if key.startswith("load.saturated"):
+        return bool(look_up(result.metrics, key))
+    return not key.startswith(DETAILS)
 
 
 def print_check(results: Sequence[Result], console: Console) -> None:

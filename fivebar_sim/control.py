@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from importlib.metadata import EntryPoint, entry_points
-from typing import Any, ClassVar, Literal, NamedTuple, Protocol, runtime_checkable
+from typing import Any, ClassVar, NamedTuple, Protocol, runtime_checkable
 
 import msgspec
 
@@ -11,13 +11,9 @@ from fivebar_sim.arrays import Array
 from fivebar_sim.errors import ConfigError, unknown
 from fivebar_sim.geometry import FiveBar
 from fivebar_sim.motion import Motion
-from fivebar_sim.servo import Integrator, Servo
+from fivebar_sim.servo import Drive, Integrator, Servo
 
 GROUP = "fivebar_sim.controllers"
-
-
-Drive = Literal["position", "torque"]
-"""What a command is: an angle for the servo [rad], or a torque for the bare motor [N m]."""
 
 
 class Observation(NamedTuple):
@@ -63,11 +59,15 @@ class Feedback(Protocol):
 
     Attributes:
         drive: Whether its commands are angles or torques.
-        period: Time between two commands [s], a whole number of timesteps.
+        period: Time between two commands, a whole number of timesteps [s].
     """
 
     drive: ClassVar[Drive]
-    period: float
+
+    @property
+    def period(self) -> float:
+        """Time between two commands [s]."""
+        ...
 
     def command(self, leg: FiveBar, servo: Servo, seen: Observation, wanted: Reference) -> Array:
         """Return the commands (A, E) that hold until the next one [rad or N m], (..., 2)."""
@@ -122,9 +122,9 @@ def find(name: str) -> type[Any]:
             f"cannot load controller {name!r} from {value}: {type(error).__name__}: {error}"
         ) from error
     struct = isinstance(kind, type) and issubclass(kind, msgspec.Struct)
-    if not struct or not callable(getattr(kind, "setpoints", None)):
+    if not struct or not any(callable(getattr(kind, m, None)) for m in ("setpoints", "command")):
         raise ConfigError(
-            f"controller {name!r}: {value} must be a msgspec Struct with a method setpoints, "
-            f"got {kind!r}"
+            f"controller {name!r}: {value} must be a msgspec Struct with a method setpoints or "
+            f"command, got {kind!r}"
         )
     return kind

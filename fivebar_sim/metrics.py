@@ -3,17 +3,31 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from fivebar_sim import kinematics
-from fivebar_sim.arrays import Array
+from fivebar_sim import ground, kinematics, load
+from fivebar_sim.arrays import Array, Bools
 from fivebar_sim.geometry import FiveBar
+from fivebar_sim.paths import Gait
+
+if TYPE_CHECKING:
+    from fivebar_sim.scenario import Scenario
 
 Record = dict[str, Array]
 
 JOINT_COLUMNS = ("theta_A", "theta_B", "theta_E", "theta_D")
+
+GROUND_KEYS = (
+    "ground.force_max.x",
+    "ground.force_max.z",
+    "ground.stance_share",
+    "ground.slip",
+    "ground.foot_height_max",
+    "ground.flight_max",
+)
+"""The metrics of scenes with a ground."""
 
 LIMIT_KEYS = (
     "tracking.rms",
@@ -26,6 +40,19 @@ LIMIT_KEYS = (
     "load.torque_peak.E",
     "load.share_A",
     "load.thermal_share_A",
+    "load.peak_ratio",
+    "load.rms_ratio",
+    "load.work.A.positive",
+    "load.work.A.negative",
+    "load.work.A.net",
+    "load.work.E.positive",
+    "load.work.E.negative",
+    "load.work.E.net",
+    "load.opposing.fraction",
+    "load.opposing.energy",
+    "load.saturated.A",
+    "load.saturated.E",
+    *GROUND_KEYS,
     "branch.flips",
     "warnings",
 )
@@ -43,49 +70,83 @@ class Limit(NamedTuple):
 
 
 def measure(
-    leg: FiveBar, record: Mapping[str, Array], window: slice, warnings: int
+    scenario: Scenario,
+    record: Mapping[str, Array],
+    start: Array,
+    saturated: Bools,
+    warnings: int,
 ) -> dict[str, Any]:
     """Return the metrics of a run, in SI units.
 
-    With e = |foot - target|, and tau the torque of motor A or E, over the window:
+    With e = |foot - target| over the window, tracking.rms = sqrt(mean e^2); load is that of
+    `load.measure`, and saturated the part of the steps in which the torque limit clipped. closure
+    is the loop gap over the whole run, and branch looks at every step of it.
 
-        tracking.rms = sqrt(mean e^2)
-        load.share_A = sum |tau_A| / (sum |tau_A| + sum |tau_E|), thermal_share_A the same of tau^2
+    Args:
+        scenario: What was run.
+        record: The columns of rollout.parquet.
+        start: (theta_A, theta_E) at t = 0 [rad], (2,).
+        saturated: Whether the torque limit clipped A and E in each step, (N, 2).
+        warnings: MuJoCo's warnings.
+    """
+    window = scenario.window
+    error, gap = tracking_error(record)[window], record["gap"]
+    measured = {
+        "tracking": {"rms": _rms(error), "max": float(error.max())},
+        "closure": {"rms": _rms(gap), "max": float(gap.max())},
+        "load": _load(scenario, record, start, saturated),
+        "branch": _branch(scenario.leg, record),
+        "warnings": int(warnings),
+    }
+    if "ground_z" in record:
+        measured["ground"] = ground.measure(scenario.leg, record, window)
+    return measured
 
-    closure is the loop gap over the whole run, and branch looks at every step of it.
+
+def tracking_error(record: Mapping[str, Array]) -> Array:
+    """Return the distance of the foot from its target [m], (N,)."""
+    return np.hypot(record["foot_x"] - record["target_x"], record["foot_z"] - record["target_z"])
+
+
+def lost_path(leg: FiveBar, record: Mapping[str, Array]) -> float | None:
+    """Return when the foot first was farther from its target than the leg is long [s], or None."""
+    lost = tracking_error(record) > leg.size
+    return float(record["time"][np.argmax(lost)]) if lost.any() else None
+
+
+def left_path(leg: FiveBar, record: Mapping[str, Array], by: float) -> float:
+    """Return when the foot left its path [s]: the last time within a tenth of the leg's size of it.
 
     Args:
         leg: The leg.
         record: The columns of rollout.parquet.
-        window: The rows that tracking and load are measured over.
-        warnings: MuJoCo's warnings.
+        by: When it was lost, or the simulation broke down [s].
     """
-    error = np.hypot(record["foot_x"] - record["target_x"], record["foot_z"] - record["target_z"])[
-        window
-    ]
-    gap = record["gap"]
-    return {
-        "tracking": {"rms": _rms(error), "max": float(error.max())},
-        "closure": {"rms": _rms(gap), "max": float(gap.max())},
-        "load": _load(record["torque_A"][window], record["torque_E"][window]),
-        "branch": _branch(leg, record),
-        "warnings": warnings,
-    }
+    near = (tracking_error(record) <= 0.1 * leg.size) & (record["time"] <= by)
+    return float(record["time"][np.flatnonzero(near)[-1]]) if near.any() else 0.0
 
 
-def _load(tau_A: Array, tau_E: Array) -> dict[str, Any]:
-    return {
-        "torque_rms": {"A": _rms(tau_A), "E": _rms(tau_E)},
-        "torque_peak": {"A": float(np.abs(tau_A).max()), "E": float(np.abs(tau_E).max())},
-        "share_A": _share(np.abs(tau_A), np.abs(tau_E)),
-        "thermal_share_A": _share(tau_A**2, tau_E**2),
-    }
-
-
-def _share(part: Array, other: Array) -> float | None:
-    """Return part's share of the sum of both, or None where there is nothing to share."""
-    whole = float(part.sum() + other.sum())
-    return float(part.sum()) / whole if whole > 0.0 else None
+def _load(
+    scenario: Scenario, record: Mapping[str, Array], start: Array, saturated: Bools
+) -> dict[str, Any]:
+    """Return how the motors share the load over the window, and how often they were clipped."""
+    window, path, h = scenario.window, scenario.path, scenario.sim.timestep
+    torque, theta = (
+        np.stack([record[f"{name}_A"], record[f"{name}_E"]], axis=-1)
+        for name in ("torque", "theta")
+    )
+    turned = np.concatenate([start[None], theta])[window.start : window.stop + 1]
+    begun = np.maximum(record["time"][window] - h, 0.0)  # when the steps began
+    phase = stance = None
+    if path.period is not None:
+        phase = path.cycle(begun) if isinstance(path, Gait) else np.mod(begun / path.period, 1.0)
+    if "ground_z" in record:
+        stance = ground.stands(record)[window]
+    elif isinstance(path, Gait):
+        stance = path.in_stance(begun)
+    measured = load.measure(torque[window], turned, h, stance=stance, phase=phase)
+    clipped = saturated[window].mean(axis=0).tolist()
+    return {**measured, "saturated": dict(zip("AE", clipped, strict=True))}
 
 
 def _branch(leg: FiveBar, record: Mapping[str, Array]) -> dict[str, Any]:

@@ -1,85 +1,113 @@
-"""The leg as a MuJoCo model: loads models/leg.xml and moves its numbers to a `FiveBar`.
+"""The leg as a MuJoCo model: loads its MJCF and moves the numbers to a `FiveBar` and a scene.
 
-The structure lives in the file alone; nothing here rebuilds it.
+The structure lives in models/leg.xml, and in models/scenes/, which attach it; nothing here rebuilds
+it.
 """
 
 from __future__ import annotations
 
-from typing import Literal, get_args
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import get_args
 
 import mujoco
 import numpy as np
 
-from fivebar_sim import kinematics, resources
+from fivebar_sim import kinematics, loop, resources
 from fivebar_sim.arrays import Array
 from fivebar_sim.errors import ArgumentError, GeometryError, unknown
-from fivebar_sim.geometry import FiveBar, Link
+from fivebar_sim.geometry import FiveBar, Link, combined
 from fivebar_sim.kinematics.stops import stops_at_C
-from fivebar_sim.servo import Integrator, Servo
-
-Scene = Literal["air"]
+from fivebar_sim.scenes import Ground, Payload, Scene, Treadmill, named
+from fivebar_sim.servo import Drive, Integrator, Servo
 
 JOINTS = ("A", "B", "E", "D")
-"""The joints in the order of qpos, and of every (..., 4) array of joint angles."""
+"""The joints in the order of qpos, and of every (..., 4) array of joint angles.
+
+On a rail hip_z comes before them: they are always the last four.
+"""
 
 HIP_HEIGHT = 1.3
 """Height of a fixed hip above the floor, in leg sizes: the foot cannot touch."""
-
-CONNECT = {
-    "discrete": ((1e-4, 1.0), (0.95, 0.99, 0.001)),
-    "implicitfast": ((2.0, 1.0), (0.9999, 0.9999, 0.001)),  # time constant in timesteps
-}
-"""solref and solimp of the loop's closure, by integrator; measured in docs/model.md."""
 
 
 def build(
     leg: FiveBar,
     *,
     servo: Servo | None = None,
-    scene: Scene = "air",
+    scene: Scene | str = "air",
     timestep: float | None = None,
     integrator: Integrator = "discrete",
+    drive: Drive = "position",
 ) -> mujoco.MjModel:
-    """Return the compiled model of a leg, closed in its rest pose.
+    """Return the compiled model of a leg in a scene, closed in its rest pose.
 
-    qpos reads (theta_A, theta_B, theta_E, theta_D). The keyframe `home` is the rest pose.
+    qpos ends with (theta_A, theta_B, theta_E, theta_D), and ctrl with (A, E). The keyframe `home`
+    is the rest pose, on a rail with the foot on the floor.
 
     Args:
         leg: The leg.
-        servo: Gains and limit of the servos at A and E; None leaves ideal joints: no damping,
+        servo: Gains and limits of the servos at A and E; None leaves ideal joints: no damping,
             no limit, the file's position gain.
-        scene: "air" fixes the hip above the floor.
+        scene: A scene, or the name of one with its defaults.
         timestep: [s]; None is the file's.
         integrator: "discrete" or "implicitfast".
+        drive: Whether ctrl is an angle or a torque.
 
     Raises:
-        ArgumentError: Unknown scene or integrator, or a timestep that is not positive.
+        ArgumentError: Unknown scene, integrator or drive, or a timestep that is not positive.
         GeometryError: A leg that MuJoCo does not compile, as one with next to no mass.
     """
-    if scene not in get_args(Scene):
-        raise ArgumentError(unknown("scene", str(scene), get_args(Scene)))
-    spec = leg_spec(leg, servo=servo, timestep=timestep, integrator=integrator)
+    placed = named(scene) if isinstance(scene, str) else scene
+    spec = leg_spec(
+        leg, servo=servo, scene=placed, timestep=timestep, integrator=integrator, drive=drive
+    )
     try:
-        return spec.compile()
+        with quiet():
+            return spec.compile()
     except ValueError as error:
         said = " ".join(str(error).split())
         raise GeometryError(f"MuJoCo refuses leg {leg.name!r}: {said}") from None
+
+
+@contextmanager
+def quiet() -> Iterator[None]:
+    """Keep MuJoCo from printing warnings, and from logging them in the working directory.
+
+    Those of a simulation are counted in its data; those of compiling a scene say that a leg whose
+    names have no prefix cannot be saved as part of another file.
+    """
+    before = mujoco.get_mju_user_warning()
+    mujoco.set_mju_user_warning(lambda message: None)
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            yield
+    finally:
+        mujoco.set_mju_user_warning(before)
 
 
 def leg_spec(
     leg: FiveBar,
     *,
     servo: Servo | None = None,
+    scene: Scene | None = None,
     timestep: float | None = None,
     integrator: Integrator = "discrete",
+    drive: Drive = "position",
 ) -> mujoco.MjSpec:
     """Return leg.xml with the numbers of a leg, to compile or to attach by its body `hip`.
 
-    Arguments and errors are those of `build`.
+    Arguments and errors are those of `build`; with a scene it is that scene's file.
     """
     if integrator not in get_args(Integrator):
         raise ArgumentError(unknown("integrator", str(integrator), get_args(Integrator)))
-    spec = mujoco.MjSpec.from_file(str(resources.folder("models") / "leg.xml"))
+    if drive not in get_args(Drive):
+        raise ArgumentError(unknown("drive", str(drive), get_args(Drive)))
+    file = "leg.xml" if scene is None else f"scenes/{scene.kind}.xml"
+    with quiet():
+        spec = mujoco.MjSpec.from_file(str(resources.folder("models") / file))
     if timestep is not None:
         if not 0.0 < timestep < np.inf:
             raise ArgumentError(f"timestep must be in (0, inf) s, got {timestep!r}")
@@ -92,9 +120,55 @@ def leg_spec(
     _place(spec, leg, q)
     _size(spec, leg)
     _weigh(spec, leg)
-    _drive(spec, servo)
+    _drive(spec, servo, drive)
     _close(spec, integrator, q)
+    if isinstance(scene, Payload):
+        _load(spec, leg, scene)
+    elif isinstance(scene, Ground):
+        _stand(spec, leg, scene, q)
     return spec
+
+
+def _load(spec: mujoco.MjSpec, leg: FiveBar, scene: Payload) -> None:
+    """Add the payload to the link that carries the foot."""
+    if scene.mass > 0.0:
+        point = Link(scene.mass, leg.foot_offset, 0.0)
+        _explicit(spec.body("L2"), combined(leg.links[1], point))
+
+
+def _stand(spec: mujoco.MjSpec, leg: FiveBar, scene: Ground, q: Array) -> None:
+    """Put the hip on the rail with its trunk, and in the keyframes the foot on the floor."""
+    spec.body("hip").pos = (0.0, 0.0, 0.0)
+    spec.joint("hip_z").ref = 0.0
+    trunk = spec.body("trunk")
+    trunk.mass = scene.mass
+    trunk.ipos = (0.0, 0.0, 0.0)
+    spec.geom("trunk").pos = (0.0, 0.0, 2.5 * leg.radius)
+    spec.geom("foot").friction[0] = scene.friction
+    if isinstance(scene, Treadmill):
+        spec.geom("floor").surfacevel = (-(scene.speed or 0.0), 0.0, 0.0, 0.0, 0.0, 0.0)
+    for key in spec.keys:
+        key.qpos = (standing(leg, q), *q)
+        key.ctrl = spec.key("home").ctrl
+
+
+def standing(leg: FiveBar, q: Array) -> float:
+    """Return the height of the hip frame's origin above the floor at which the foot touches it [m].
+
+    Args:
+        leg: The leg.
+        q: Joint angles [rad], (4,).
+
+    Raises:
+        GeometryError: The foot is above the hip.
+    """
+    height = leg.foot_radius - float(kinematics.chain_points(leg, q).F[1])
+    if not height > 0.0:
+        raise GeometryError(
+            f"leg {leg.name!r} cannot stand: its foot must be below the hip, "
+            f"got {1e3 * (leg.foot_radius - height):.4g} mm above"
+        )
+    return height
 
 
 def _place(spec: mujoco.MjSpec, leg: FiveBar, q: Array) -> None:
@@ -115,7 +189,7 @@ def _place(spec: mujoco.MjSpec, leg: FiveBar, q: Array) -> None:
     }.items():
         spec.site(site).pos = pos
     spec.key("home").qpos = q
-    spec.key("home").ctrl = q[[0, 2]]
+    spec.key("home").ctrl = (*[0.0] * (len(spec.actuators) - 2), *q[[0, 2]])
 
 
 def _size(spec: mujoco.MjSpec, leg: FiveBar) -> None:
@@ -167,26 +241,31 @@ def _explicit(body: mujoco.MjsBody, link: Link) -> None:
     body.inertia = (1e-3 * link.inertia, link.inertia, link.inertia)
 
 
-def _drive(spec: mujoco.MjSpec, servo: Servo | None) -> None:
-    """Set the servos at A and E."""
+def _drive(spec: mujoco.MjSpec, servo: Servo | None, drive: Drive) -> None:
+    """Set the motors at A and E: the law of `Servo`, or a bare motor, whose ctrl at rest is 0."""
     for name in ("A", "E"):
         joint, actuator = spec.joint(name), spec.actuator(name)
+        joint.damping[0] = 0.0 if servo is None else servo.passive(drive)
+        if drive == "torque":
+            actuator.set_to_motor()
+        elif servo is not None:
+            actuator.set_to_position(kp=servo.kp, kv=0.0 if servo.speed is None else servo.kd)
         if servo is None:
-            joint.damping[0] = 0.0
             continue
-        joint.damping[0] = servo.kd
-        actuator.set_to_position(kp=servo.kp, kv=0.0)
+        if servo.friction > 0.0:  # hard: with MuJoCo's own values a light joint does not stick
+            joint.frictionloss = servo.friction
+            joint.solref_friction = (2.0 * spec.option.timestep, 1.0)
+            joint.solimp_friction[:3] = (0.9999, 0.9999, 0.001)
         if servo.limit is not None:
             actuator.forcerange = (-servo.limit, servo.limit)
             actuator.forcelimited = mujoco.mjtLimited.mjLIMITED_TRUE
+    if drive == "torque":
+        spec.key("home").ctrl = np.zeros(len(spec.actuators))
 
 
 def _close(spec: mujoco.MjSpec, integrator: Integrator, q: Array) -> None:
     """Set the loop's stiffness, and the stops of the angle at C around the rest pose's branch."""
-    (timeconst, ratio), solimp = CONNECT[integrator]
-    if integrator == "implicitfast":
-        timeconst *= spec.option.timestep
     connect = spec.equality("C")
-    connect.solref = (timeconst, ratio)
-    connect.solimp[:3] = solimp
+    connect.solref = loop.solref(integrator, spec.option.timestep)
+    connect.solimp[:3] = loop.CONNECT[integrator][1]
     spec.tendon("C_angle").range = stops_at_C(q)

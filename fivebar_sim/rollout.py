@@ -10,14 +10,16 @@ from typing import Any, NamedTuple
 import mujoco
 import numpy as np
 
-from fivebar_sim import kinematics, metrics, model, motion
+from fivebar_sim import feedback, holding, metrics, model, motion
 from fivebar_sim.arrays import Array
+from fivebar_sim.control import Feedback, Setpoints
 from fivebar_sim.errors import ConfigError, DivergedError, FiveBarError
-from fivebar_sim.metrics import JOINT_COLUMNS, Limit, Record
+from fivebar_sim.metrics import Limit, Record
 from fivebar_sim.motion import Motion
 from fivebar_sim.provenance import provenance
+from fivebar_sim.record import broken, columns, saturated
 from fivebar_sim.scenario import Scenario
-from fivebar_sim.servo import applied_torque
+from fivebar_sim.scenes import Ground, Payload
 from fivebar_sim.simulate import States, check, simulate
 
 
@@ -27,14 +29,26 @@ class Plan(NamedTuple):
     Attributes:
         scenario: What was asked for.
         motion: The foot and the joints at every step.
-        ctrl: Setpoints of every step [rad], (N, 2).
         model: The leg's model.
+        start: qpos at t = 0, (nq,).
+        pushes: Commands of the actuators that are no motors, the forces on the foot in the scene
+            "payload", at every step [N], (N, 0 or 2).
+        setpoints: What reaches the motors in every step [rad], (N, 2); None where a feedback
+            controller decides on the way.
     """
 
     scenario: Scenario
     motion: Motion
-    ctrl: Array
     model: mujoco.MjModel
+    start: Array
+    pushes: Array
+    setpoints: Array | None
+
+    @property
+    def ctrl(self) -> Array:
+        """The commands of every step, as MuJoCo has them, (N, nu); not of a feedback controller."""
+        assert self.setpoints is not None
+        return np.concatenate([self.pushes, self.setpoints], axis=1)
 
 
 class Result(NamedTuple):
@@ -69,26 +83,47 @@ def plan(scenario: Scenario) -> Plan:
 
     Raises:
         UnreachableError: The path leaves what the leg can reach; says when and where.
-        ConfigError: A controller that plans setpoints of the wrong shape or not finite.
+        ConfigError: A controller that plans setpoints of the wrong shape or not finite, a control
+            period that is no whole number of timesteps, or servos that cannot hold the leg.
+        GeometryError: A leg that cannot stand on the scene's ground.
     """
-    h, steps, integrator = scenario.sim.timestep, scenario.steps, scenario.sim.integrator
-    wanted = motion.plan(scenario.leg, scenario.path, steps, h)
-    ctrl = _setpoints(scenario, wanted)
+    sim, scene = scenario.sim, scenario.scene
+    wanted = motion.plan(
+        scenario.leg,
+        scenario.path,
+        scenario.steps,
+        sim.timestep,
+        force=scenario.foot_force,
+        payload=scenario.payload,
+    )
+    holding.check(scenario, wanted)
+    start, pushes = wanted.q[0], np.empty((scenario.steps, 0))
+    if isinstance(scene, Ground):
+        start = np.array([model.standing(scenario.leg, start) + scene.drop, *start])
+    if isinstance(scene, Payload):
+        pushes = wanted.force[:-1]
+    controller = scenario.controller
+    asked = isinstance(controller, Feedback)
     built = model.build(
         scenario.leg,
         servo=scenario.servo,
-        scene="air",
-        timestep=h,
-        integrator=integrator,
+        scene=scene,
+        timestep=sim.timestep,
+        integrator=sim.integrator,
+        drive=controller.drive if asked else "position",
     )
-    return Plan(scenario, wanted, ctrl, built)
+    setpoints = None if asked else _setpoints(scenario, controller, wanted)
+    planned = Plan(scenario, wanted, built, start, pushes, setpoints)
+    if asked:
+        feedback.period_steps(planned)
+    return planned
 
 
-def _setpoints(scenario: Scenario, wanted: Motion) -> Array:
-    """Return the setpoints that the scenario's controller plans, checked."""
+def _setpoints(scenario: Scenario, controller: Setpoints, wanted: Motion) -> Array:
+    """Return the setpoints that the scenario's controller plans, checked, as they arrive."""
     name, shape = f"controller {scenario.controller_name!r}", (scenario.steps, 2)
     try:
-        planned = scenario.controller.setpoints(
+        planned = controller.setpoints(
             scenario.leg, scenario.servo, wanted, scenario.sim.integrator
         )
     except FiveBarError:
@@ -101,7 +136,7 @@ def _setpoints(scenario: Scenario, wanted: Motion) -> Array:
             f"{name} must plan finite setpoints [rad] of shape {shape}, "
             f"got {ctrl.dtype} of shape {ctrl.shape}"
         )
-    return ctrl.astype(np.float64)
+    return scenario.servo.sent(ctrl.astype(np.float64), wanted.q[0, ::2], scenario.sim.timestep)
 
 
 def run(scenario: Scenario) -> Result:
@@ -133,21 +168,28 @@ def run_all(plans: Sequence[Plan], nthread: int = 1) -> list[Result]:
     """
     results: dict[int, Result] = {}
 
-    def alike(index: int) -> tuple[float, int]:
-        return plans[index].motion.timestep, len(plans[index].ctrl)
+    def alike(index: int) -> tuple[float, int, str, int]:
+        planned = plans[index]
+        asked = 0 if planned.setpoints is not None else feedback.period_steps(planned)
+        return planned.motion.timestep, planned.scenario.steps, planned.scenario.scene.kind, asked
 
-    for _, group in groupby(sorted(range(len(plans)), key=alike), key=alike):
+    for key, group in groupby(sorted(range(len(plans)), key=alike), key=alike):
         members = list(group)
         chosen = [plans[i] for i in members]
-        states = simulate(
-            [p.model for p in chosen],
-            np.stack([p.motion.q[0] for p in chosen]),
-            np.stack([p.ctrl for p in chosen]),
-            nthread,
-        )
+        states = feedback.steer(chosen, nthread) if key[-1] else _follow(chosen, nthread)
         for row, i in enumerate(members):
-            results[i] = _result(plans[i], States(*(field[row : row + 1] for field in states)))
+            results[i] = _result(plans[i], states.rows(slice(row, row + 1)))
     return [results[i] for i in range(len(plans))]
+
+
+def _follow(plans: Sequence[Plan], nthread: int) -> States:
+    """Return the states of plans whose setpoints are known."""
+    return simulate(
+        [p.model for p in plans],
+        np.stack([p.start for p in plans]),
+        np.stack([p.ctrl for p in plans]),
+        nthread,
+    )
 
 
 def _result(planned: Plan, states: States) -> Result:
@@ -156,11 +198,14 @@ def _result(planned: Plan, states: States) -> Result:
         check(states, scenario.sim.timestep)
         _check_resolution(scenario)
     except DivergedError as error:
-        raise DivergedError(f"{scenario.name}: {error}", error.time) from None
-    record = _record(planned, states.qpos[0], states.qvel[0])
-    measured = metrics.measure(
-        scenario.leg, record, scenario.window, warnings=int(states.warnings[0])
-    )
+        raise broken(planned, states, error) from None
+    record = columns(planned, states)
+    lost = metrics.lost_path(scenario.leg, record)
+    if lost is not None:
+        far = f"it was {1e3 * scenario.leg.size:.4g} mm away from it at t = {lost:g} s"
+        raise broken(planned, states, DivergedError(far, lost))
+    start, clipped = planned.motion.q[0, ::2], saturated(planned, states)
+    measured = metrics.measure(scenario, record, start, clipped, states.warnings[0])
     limits = metrics.judge(measured, scenario.limits)
     good = all(limit.ok for limit in limits) and measured["branch"]["flips"] == 0
     measured["verdict"] = "pass" if good else "fail"
@@ -180,38 +225,3 @@ def _check_resolution(scenario: Scenario) -> None:
             f"period of {period:g} s, got {h:g} s",
             h,
         )
-
-
-def _record(planned: Plan, qpos: Array, qvel: Array) -> Record:
-    """Return the columns of rollout.parquet: row k is the state at t = (k + 1) h.
-
-    Foot and gap are those of qpos itself, not MuJoCo's kinematics of the step before.
-    """
-    scenario, wanted = planned.scenario, planned.motion
-    before = np.concatenate([wanted.q[:1], qpos[:-1]])
-    motors = [JOINT_COLUMNS.index("theta_A"), JOINT_COLUMNS.index("theta_E")]
-    torque = applied_torque(
-        scenario.servo,
-        scenario.sim.integrator,
-        planned.ctrl,
-        before[:, motors],
-        qpos[:, motors],
-        qvel[:, motors],
-    )
-    points = kinematics.chain_points(scenario.leg, qpos)
-    target, gap = wanted.foot[1:], points.C_right - points.C_left
-    record = {
-        "time": wanted.time[1:],
-        "target_x": target[:, 0],
-        "target_z": target[:, 1],
-        "foot_x": points.F[:, 0],
-        "foot_z": points.F[:, 1],
-    }
-    record |= {name: qpos[:, i] for i, name in enumerate(JOINT_COLUMNS)}
-    record |= {
-        name.replace("theta", "theta_dot"): qvel[:, i] for i, name in enumerate(JOINT_COLUMNS)
-    }
-    record |= {"ctrl_A": planned.ctrl[:, 0], "ctrl_E": planned.ctrl[:, 1]}
-    record |= {"torque_A": torque[:, 0], "torque_E": torque[:, 1]}
-    record["gap"] = np.hypot(gap[:, 0], gap[:, 1])
-    return {name: np.ascontiguousarray(column) for name, column in record.items()}

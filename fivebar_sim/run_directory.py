@@ -15,8 +15,6 @@ import tomli_w
 from fivebar_sim import recording
 from fivebar_sim.arrays import Array
 from fivebar_sim.errors import RunDirectoryError
-from fivebar_sim.paths import Csv
-from fivebar_sim.scenario import copied_name
 
 if TYPE_CHECKING:
     from fivebar_sim.rollout import Result
@@ -89,8 +87,8 @@ def _fill(stage: Path, result: Result) -> None:
     """Write the files of a run into an empty directory."""
     scenario = result.scenario
     (stage / "scenario.toml").write_text(tomli_w.dumps(scenario.table()), encoding="utf-8")
-    if isinstance(scenario.path, Csv):
-        shutil.copyfile(scenario.path.file, stage / copied_name(scenario.path))
+    for name, source in scenario.files.items():
+        shutil.copyfile(source, stage / name)
     text = json.dumps(result.metrics, indent=2, allow_nan=False)
     (stage / "metrics.json").write_text(text + "\n", encoding="utf-8")
     write_record(stage / "rollout.parquet", result.record)

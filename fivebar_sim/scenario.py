@@ -3,35 +3,34 @@
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Iterable
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any
 
 import msgspec
 import numpy as np
 
-from fivebar_sim import control, resources, tables
+from fivebar_sim import forces, paths, resources, scenario_table, tables
 from fivebar_sim.arrays import Array
 from fivebar_sim.checks import check_number
-from fivebar_sim.control import Setpoints
-from fivebar_sim.errors import ArgumentError, ConfigError, unknown
-from fivebar_sim.geometry import FiveBar, read_table
-from fivebar_sim.metrics import LIMIT_KEYS
-from fivebar_sim.paths import KINDS, Csv, FootPath
+from fivebar_sim.control import Feedback, Setpoints
+from fivebar_sim.errors import ConfigError, unknown
+from fivebar_sim.forces import FootForce
+from fivebar_sim.geometry import FiveBar
+from fivebar_sim.metrics import GROUND_KEYS, LIMIT_KEYS
+from fivebar_sim.paths import FootPath, Gait
+from fivebar_sim.scenes import Air, Ground, Payload, Scene, Treadmill
+from fivebar_sim.sensors import Sensors
 from fivebar_sim.servo import Integrator, Servo
 from fivebar_sim.tables import Table
 
-SCENES = ("air",)
 MOST_STEPS = 5_000_000
 """Physics steps of one run: what its arrays need, about 500 bytes a step, must fit in memory."""
 
-NAME = re.compile(r"""(?![. ])[^/\\:*?"<>|]+(?<! )""")
-LONGEST_NAME = 200
-"""A file may have 255 bytes on most systems, and the run directory's stage adds some."""
-
-KEYS = ("name", "leg", "scene", "duration", "path", "servo", "controller", "sim", "limits")
+KEYS = (
+    *("name", "leg", "scene", "duration", "path", "force", "servo", "sensors", "controller"),
+    *("sim", "limits"),
+)
 
 
 class Sim(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -40,7 +39,7 @@ class Sim(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True)
     Attributes:
         timestep: h [s].
         integrator: MuJoCo's integrator, "discrete" or "implicitfast".
-        seed: Of everything random in a run; the plain servo has nothing random.
+        seed: Of everything random in a run, as the sensors' noise.
     """
 
     timestep: float = 0.001
@@ -59,11 +58,14 @@ class Scenario(msgspec.Struct, frozen=True, kw_only=True):
         name: What the run directory is called.
         leg: The leg.
         path: The foot's path.
-        controller: What plans the servos' setpoints.
+        controller: What drives the motors: plans their setpoints, or is asked on the way.
         controller_name: Its name in the entry-point group.
-        scene: "air".
+        scene: What the leg hangs on and stands on.
         duration: [s].
+        force: What the world does to the foot: applied in the scene "payload", and what the
+            controller reckons with in every scene; None is nothing.
         servo: The servos at A and E.
+        sensors: What a feedback controller sees of them.
         sim: Timestep, integrator, seed.
         limits: Metric's dotted key to (low, high).
     """
@@ -71,11 +73,13 @@ class Scenario(msgspec.Struct, frozen=True, kw_only=True):
     name: str
     leg: FiveBar
     path: FootPath
-    controller: Setpoints
+    controller: Setpoints | Feedback
     controller_name: str
-    scene: str = "air"
+    scene: Scene = Air()
     duration: float = 4.0
+    force: FootForce | None = None
     servo: Servo = Servo()
+    sensors: Sensors = Sensors()
     sim: Sim = Sim()
     limits: dict[str, tuple[float, float]] = {}
 
@@ -86,18 +90,36 @@ class Scenario(msgspec.Struct, frozen=True, kw_only=True):
 
     @property
     def window(self) -> slice:
-        """The rows that tracking and load are measured over: whole periods after the ramp."""
+        """The rows that tracking and load are measured over.
+
+        Whole periods after the ramp; of a path that comes to rest, until it does.
+        """
         h, ramp, period = self.sim.timestep, self.path.ramp, self.path.period
-        first = round(ramp / h)
-        if period is None:
-            return slice(first, self.steps)
-        periods = math.floor((self.duration - ramp) / period * (1.0 + 1e-9))
-        return slice(first, min(round((ramp + periods * period) / h), self.steps))
+        first, last = round(ramp / h), self.steps
+        if period is not None:
+            periods = math.floor((self.duration - ramp) / period * (1.0 + 1e-9))
+            return slice(first, min(round((ramp + periods * period) / h), last))
+        return slice(first, min(round(min(self.path.rest, self.duration) / h), last))
+
+    @property
+    def times(self) -> Array:
+        """The times of all steps [s], (N + 1,)."""
+        return np.arange(self.steps + 1, dtype=np.float64) * self.sim.timestep
 
     @property
     def foot_path(self) -> Array:
         """The foot's targets over the whole run, at every step [m], (N + 1, 2)."""
-        return self.path.at(np.arange(self.steps + 1) * self.sim.timestep).position
+        return self.path.at(self.times).position
+
+    @property
+    def foot_force(self) -> Array | None:
+        """What the world does to the foot, at every step [N], (N + 1, 2)."""
+        return None if self.force is None else self.force.at(self.times, self.path)
+
+    @property
+    def payload(self) -> float:
+        """The point mass that the foot carries [kg]."""
+        return self.scene.mass if isinstance(self.scene, Payload) else 0.0
 
     @classmethod
     def load(cls, source: str | Path, settings: Iterable[str] = ()) -> Scenario:
@@ -116,7 +138,7 @@ class Scenario(msgspec.Struct, frozen=True, kw_only=True):
             raise ConfigError(f"{unknown('scenario', str(source), shipped)}; or a path to a .toml")
         table = tables.read(path, "scenario")
         for setting in settings:
-            _set(table, *tables.parse_setting(setting), str(source))
+            scenario_table.change(table, *tables.parse_setting(setting), str(source))
         return cls.from_table({"name": path.stem, **table}, str(source), path.parent)
 
     @classmethod
@@ -128,21 +150,25 @@ class Scenario(msgspec.Struct, frozen=True, kw_only=True):
         """
         tables.check_keys(table, KEYS, where)
         tables.check_finite(table, where)
-        name, scene, duration = _scalars(table, where)
-        controller_name, controller = _controller(table.get("controller", {}), where)
+        name, duration = scenario_table.name_and_duration(table, where)
+        controller_name, controller = scenario_table.controller(table.get("controller", {}), where)
+        path = scenario_table.path(table.get("path"), where, folder)
         scenario = cls(
             name=name,
-            leg=_leg(table.get("leg", "classic"), where, folder),
-            path=_path(table.get("path"), where, folder),
+            leg=scenario_table.leg(table.get("leg", "classic"), where, folder),
+            path=path,
             controller=controller,
             controller_name=controller_name,
-            scene=scene,
+            scene=_belted(scenario_table.scene(table.get("scene", "air"), where), path, where),
             duration=duration,
-            servo=tables.convert(table.get("servo", {}), Servo, "servo", where),
+            force=scenario_table.force(table.get("force"), where, folder),
+            servo=scenario_table.servo(table.get("servo", {}), where, folder),
+            sensors=tables.convert(table.get("sensors", {}), Sensors, "sensors", where),
             sim=tables.convert(table.get("sim", {}), Sim, "sim", where),
             limits=tables.bounds(table.get("limits", {}), LIMIT_KEYS, "limits", where),
         )
         _check_window(scenario, where)
+        _check_scene(scenario, where)
         return scenario
 
     def table(self) -> Table:
@@ -150,131 +176,59 @@ class Scenario(msgspec.Struct, frozen=True, kw_only=True):
 
         A CSV is named by its copy beside the table; see `copied_name`.
         """
-        path: Table = msgspec.to_builtins(self.path)
-        if isinstance(self.path, Csv):
-            path["file"] = copied_name(self.path)
-        return {
+        path, force = (msgspec.to_builtins(part) for part in (self.path, self.force))
+        for part, name in zip((path, force), self.copies, strict=True):
+            if name is not None:
+                part["file"] = name
+        table = {
             "name": self.name,
-            "scene": self.scene,
+            "scene": "air" if self.scene == Air() else msgspec.to_builtins(self.scene),
             "duration": self.duration,
             "leg": _present(asdict(self.leg)),
             "path": _present(path),
+            "force": None if force is None else _present(force),
             "servo": _present(msgspec.to_builtins(self.servo)),
             "controller": {
                 "name": self.controller_name,
                 **_present(msgspec.to_builtins(self.controller)),
             },
+            "sensors": msgspec.to_builtins(self.sensors),
             "sim": msgspec.to_builtins(self.sim),
             "limits": {
                 key: high if low == -math.inf else [low, high]
                 for key, (low, high) in self.limits.items()
             },
         }
+        return _present(table)
+
+    @property
+    def copies(self) -> tuple[str | None, str | None]:
+        """What the CSV of the path and that of the force are called beside a resolved scenario."""
+        path, force = copied_name(self.path), copied_name(self.force)
+        return path, f"force-{force}" if force is not None and force == path else force
+
+    @property
+    def files(self) -> dict[str, str]:
+        """The CSVs that a resolved scenario has beside it: name there to where they are."""
+        parts = zip((self.path, self.force), self.copies, strict=True)
+        csvs = (paths.Csv, forces.Csv)
+        return {name: part.file for part, name in parts if name and isinstance(part, csvs)}
 
 
-def copied_name(path: Csv) -> str:
-    """Return what a CSV is called beside a resolved scenario: ends with .csv, as no other file."""
-    name = Path(path.file).name
+def copied_name(part: FootPath | FootForce | None) -> str | None:
+    """Return what a CSV is called beside a resolved scenario: ends with .csv, as no other file.
+
+    None is for a path or force that is no CSV.
+    """
+    if not isinstance(part, (paths.Csv, forces.Csv)):
+        return None
+    name = Path(part.file).name
     return name if name.endswith(".csv") else f"{name}.csv"
 
 
 def _present(table: Table) -> Table:
     """Return the keys that have a value: TOML has no null."""
     return {key: value for key, value in table.items() if value is not None}
-
-
-def _set(table: Table, parts: list[str], value: Any, where: str) -> None:
-    """Apply one change to a scenario's table.
-
-    Another path.kind or controller.name keeps only those keys that the new one has too.
-
-    Raises:
-        ConfigError: A part of the key is a value, not a table.
-    """
-    if isinstance(table.get("leg"), str) and parts[0] == "leg" and len(parts) > 1:
-        table["leg"] = {"preset": table["leg"]}
-    if parts[0] == "limits" and len(parts) > 1:
-        if isinstance(table.get("limits"), dict):
-            table["limits"] = dict(tables.flat(table["limits"]))
-        parts = ["limits", ".".join(parts[1:])]
-    tables.put(table, parts, value, where)
-    if not isinstance(value, str):
-        return
-    if parts == ["path", "kind"] and value in KINDS:
-        known = tables.keys(KINDS[value])
-        table["path"] = {k: v for k, v in table["path"].items() if k in known}
-    if parts == ["controller", "name"] and value in control.known():
-        known = ["name", *tables.keys(control.find(value))]
-        table["controller"] = {k: v for k, v in table["controller"].items() if k in known}
-
-
-def _scalars(table: Table, where: str) -> tuple[str, str, float]:
-    name = table.get("name")
-    if not isinstance(name, str) or not _is_file_name(name):
-        raise ConfigError(
-            f"{where}: name must be a plain file name of 1 to {LONGEST_NAME} bytes, got {name!r}"
-        )
-    scene = table.get("scene", "air")
-    if scene not in SCENES:
-        raise ConfigError(f"{where}: {unknown('scene', str(scene), SCENES)}")
-    duration = table.get("duration", 4.0)
-    try:
-        check_number("duration", duration, "s", low=0.0, strict=True)
-    except ArgumentError as error:
-        raise ConfigError(f"{where}: {error}") from None
-    return name, scene, float(duration)
-
-
-def _is_file_name(name: str) -> bool:
-    """Return whether a name may be that of a run directory, on any system."""
-    plain = NAME.fullmatch(name) is not None and name.isprintable()
-    return plain and len(name.encode()) <= LONGEST_NAME
-
-
-def _leg(value: Any, where: str, folder: Path) -> FiveBar:
-    """Return the leg of "classic", of a file beside the scenario, or of a table with changes."""
-    if isinstance(value, str):
-        value = {"preset": value}
-    if not isinstance(value, dict):
-        raise ConfigError(f"{where}: leg must be a preset's name or a table, got {value!r}")
-    own = dict(value)
-    base = _preset(own.pop("preset"), where, folder) if "preset" in own else {}
-    return FiveBar.from_table({**base, **own}, f"{where}: [leg]")
-
-
-def _preset(preset: Any, where: str, folder: Path) -> Table:
-    """Return the table of a leg that ships, or of a file beside the scenario; legal by itself."""
-    if not isinstance(preset, str) or "\0" in preset:
-        raise ConfigError(f"{where}: leg.preset must be a preset's name, got {preset!r}")
-    source = folder / preset if preset.endswith(".toml") else preset
-    try:
-        table = read_table(source)
-        tables.check_finite(table, str(source))
-        FiveBar.from_table(table, str(source))
-    except ConfigError as error:
-        raise ConfigError(f"{where}: leg.preset: {error}") from None
-    return table
-
-
-def _path(value: Any, where: str, folder: Path) -> FootPath:
-    if not isinstance(value, dict) or "kind" not in value:
-        raise ConfigError(f"{where}: [path] needs a kind; known: {', '.join(sorted(KINDS))}")
-    kind = value["kind"]
-    if not isinstance(kind, str) or kind not in KINDS:
-        raise ConfigError(f"{where}: path.kind: {unknown('path', str(kind), KINDS)}")
-    return tables.convert(value, KINDS[kind], "path", where).resolve(folder)
-
-
-def _controller(value: Any, where: str) -> tuple[str, Setpoints]:
-    if not isinstance(value, dict):
-        raise ConfigError(f"{where}: controller must be a table, got {value!r}")
-    own = dict(value)
-    name = own.pop("name", "servo")
-    try:
-        kind = control.find(str(name))
-    except ConfigError as error:
-        raise ConfigError(f"{where}: controller.name: {error}") from None
-    return str(name), tables.convert(own, kind, "controller", where)
 
 
 def _check_window(scenario: Scenario, where: str) -> None:
@@ -287,6 +241,9 @@ def _check_window(scenario: Scenario, where: str) -> None:
         )
     if not scenario.steps * h <= path.end * (1.0 + 1e-9):
         raise ConfigError(f"{where}: duration must be at most the path's {path.end:g} s, {came}")
+    force = scenario.force
+    if force is not None and not scenario.steps * h <= force.end * (1.0 + 1e-9):
+        raise ConfigError(f"{where}: duration must be at most the force's {force.end:g} s, {came}")
     needs, what = path.ramp, f"the ramp of {path.ramp:g} s"
     if path.period is not None:
         needs, what = needs + path.period, f"{what} and one period of {path.period:g} s"
@@ -294,3 +251,40 @@ def _check_window(scenario: Scenario, where: str) -> None:
         raise ConfigError(
             f"{where}: duration must be longer than {what}, to have something to measure; {came}"
         )
+
+
+def _belted(scene: Scene, path: FootPath, where: str) -> Scene:
+    """Return the scene; a belt without a speed gets that of the path's stance.
+
+    Raises:
+        ConfigError: The path has no stance.
+    """
+    if not isinstance(scene, Treadmill) or scene.speed is not None:
+        return scene
+    if not isinstance(path, Gait):
+        raise ConfigError(
+            f"{where}: scene.speed is missing: only a gait path says by itself how fast the belt "
+            f"must run"
+        )
+    return msgspec.structs.replace(scene, speed=path.stance_speed)
+
+
+def _check_scene(scenario: Scenario, where: str) -> None:
+    """Raise unless the scene has what path and limits need."""
+    scene, grounded = scenario.scene, isinstance(scenario.scene, Ground)
+    kind = scenario.path.__struct_config__.tag
+    if scenario.path.needs_ground and not grounded:
+        raise ConfigError(
+            f"{where}: path.kind {kind!r} needs a ground: scene must be rail or treadmill, "
+            f"got {scene.kind!r}"
+        )
+    if isinstance(scene, Payload) and scene.mass == 0.0 and scenario.force is None:
+        raise ConfigError(
+            f"{where}: scene.mass must be in (0, inf) kg where there is no [force], got 0.0"
+        )
+    for key in scenario.limits:
+        if key in GROUND_KEYS and not grounded:
+            raise ConfigError(
+                f"{where}: limits.{key} needs a ground: scene must be rail or treadmill, "
+                f"got {scene.kind!r}"
+            )

@@ -1,69 +1,234 @@
-"""The position servo at A and E, and the torque that it really applies in one step."""
+"""The servo at A and E: its laws, what it hears of its commands, the torque that it really applies.
+
+q, v        angle and rate of the motor's joint; u the command: an angle or a torque
+limit       [N m], speed [rad/s]: the DC motor's line, torque limit at rest, none at speed
+"""
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Literal
 
 import msgspec
 import numpy as np
+from numpy.typing import NDArray
 
-from fivebar_sim.arrays import Array
+from fivebar_sim import resources, tables
+from fivebar_sim.arrays import Array, Bools
 from fivebar_sim.checks import check_number
+from fivebar_sim.errors import ArgumentError, ConfigError, unknown
 
 Integrator = Literal["discrete", "implicitfast"]
 
+Drive = Literal["position", "torque"]
+"""What a command is: an angle for the servo [rad], or a torque for the bare motor [N m]."""
+
 
 class Servo(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """A position servo at each motor: tau = clip(kp (u - theta), limit) - kd theta_dot.
+    """A servo at each motor; without `speed` an ideal one, with it a DC motor's.
 
-    In MuJoCo kp is the actuator's gain, limit its forcerange, and kd the damping of the motor's
-    joint, so that the integrator treats kd implicitly also while the limit clips.
+        position:  tau = clip(kp (u - q), limit) - kd v                       without speed
+                   tau = clip(kp (u - q) - kd v, limit) - (limit / speed) v   with it
+        torque:    tau = clip(u, limit) - (limit / speed) v                   0 without speed
+
+    In MuJoCo limit is the actuator's forcerange, and what stands behind the clip is the damping
+    of the motor's joint: the integrator treats it implicitly also while the limit clips.
 
     Attributes:
         kp: Position gain [N m/rad].
         kd: Derivative gain [N m s/rad].
-        limit: Largest torque of the kp term [N m]; None is unlimited.
+        limit: Largest torque [N m], that of the stalled motor; None is unlimited.
+        speed: No-load speed [rad/s], from which the motor has no torque left; None is no such line.
+        friction: Coulomb friction of the gear [N m]; not in the motor's torque.
+        rate: Commands a second that the bus brings [Hz]; None is one every timestep.
+        delay: From sending a command to its effect [s].
+        resolution: Step of the angles that can be commanded, counted from 0 [rad]; 0 is none.
     """
 
     kp: float = 8.0
     kd: float = 0.05
     limit: float | None = None
+    speed: float | None = None
+    friction: float = 0.0
+    rate: float | None = None
+    delay: float = 0.0
+    resolution: float = 0.0
 
     def __post_init__(self) -> None:
         check_number("kp", self.kp, "N m/rad", low=0.0, strict=True)
         check_number("kd", self.kd, "N m s/rad", low=0.0)
         if self.limit is not None:
             check_number("limit", self.limit, "N m", low=0.0, strict=True)
+        if self.speed is not None:
+            check_number("speed", self.speed, "rad/s", low=0.0, strict=True)
+            if self.limit is None:
+                raise ArgumentError("speed needs limit beside it: the stalled motor's torque [N m]")
+            check_number("limit / speed", self.back_emf, "N m s/rad")
+        check_number("friction", self.friction, "N m", low=0.0)
+        if self.rate is not None:
+            check_number("rate", self.rate, "Hz", low=0.0, strict=True)
+        check_number("delay", self.delay, "s", low=0.0)
+        check_number("resolution", self.resolution, "rad", low=0.0)
+
+    @classmethod
+    def load(cls, source: str | Path) -> Servo:
+        """Return the servo of a preset's name ("xl330") or of a TOML file's path.
+
+        Raises:
+            ConfigError: Unknown preset, unreadable file, unknown key, a number out of its range.
+        """
+        return tables.convert(read_table(source), cls, "servo", str(source))
+
+    @property
+    def back_emf(self) -> float:
+        """Torque that the motor loses with its rate, limit / speed [N m s/rad]."""
+        return 0.0 if self.speed is None or self.limit is None else self.limit / self.speed
+
+    @property
+    def damping(self) -> float:
+        """Rate gain of the position servo, which a velocity feedforward cancels [N m s/rad]."""
+        return self.kd + self.back_emf
+
+    def passive(self, drive: Drive) -> float:
+        """Return the rate gain that the limit does not clip, the joint's damping [N m s/rad]."""
+        return self.kd if self.speed is None and drive == "position" else self.back_emf
+
+    def latched(self, steps: int, timestep: float) -> NDArray[np.int64]:
+        """Return which row of a table of commands acts in each step, (N,); -1 while none has come.
+
+        With n steps a command and d steps of delay, both rounded to the nearest and n >= 1,
+
+            row(k) = n floor((k - d) / n)   for k >= d, else -1
+
+        so that row(k) <= k: a table may grow while it is used.
+
+        Args:
+            steps: N.
+            timestep: h [s].
+
+        Raises:
+            ArgumentError: Unless 0 < h, and rate <= 1 / h: no command acts for part of a step.
+        """
+        check_number("timestep", timestep, "s", low=0.0, strict=True)
+        hold = 1
+        if self.rate is not None:
+            if not self.rate * timestep <= 1.0 + 1e-9:  # rounding of 1 / h
+                raise ArgumentError(
+                    f"rate must be in (0, {1.0 / timestep:g}] Hz, at most one command a timestep "
+                    f"of {timestep:g} s, got {self.rate!r}"
+                )
+            part = self.rate * timestep  # of a command in one step
+            hold = max(1, round(1.0 / part) if part * steps > 1.0 else steps)
+        late = round(min(self.delay / timestep, steps))
+        since = np.arange(steps) - late
+        return np.where(since < 0, -1, since // hold * hold)
+
+    def rounded(self, theta: Array) -> Array:
+        """Return the nearest angles that can be commanded [rad], of the argument's shape."""
+        step = self.resolution
+        return step * np.round(theta / step) if step > 0.0 else theta
+
+    def sent(self, table: Array, rest: Array, timestep: float, drive: Drive = "position") -> Array:
+        """Return what the servos really get of a table of commands, in each step.
+
+        Args:
+            table: Commands as they are computed, row k in step k [rad or N m], (..., N, 2).
+            rest: What acts until the first command comes [rad or N m], (..., 2).
+            timestep: h [s].
+            drive: What the commands are; torques are not rounded.
+
+        Returns:
+            Commands that act [rad or N m], (..., N, 2); row k depends on no later row.
+
+        Raises:
+            ArgumentError: See `latched`.
+        """
+        row = self.latched(table.shape[-2], timestep)
+        acting = np.where(row[:, None] < 0, rest[..., None, :], table[..., np.maximum(row, 0), :])
+        return self.rounded(acting) if drive == "position" else acting
+
+
+def read_table(source: str | Path) -> tables.Table:
+    """Return the TOML table of a servo: of a preset's name, or of a file's path.
+
+    Raises:
+        ConfigError: Unknown preset, no such file, not TOML, or a number that is not finite.
+    """
+    presets = resources.shipped("models/servos")
+    path = presets.get(str(source), Path(source))
+    if path.suffix != ".toml":
+        raise ConfigError(f"{unknown('servo preset', str(source), presets)}; or a path to a .toml")
+    table = tables.read(path, "servo")
+    tables.check_finite(table, str(source))
+    return table
+
+
+def saturated(servo: Servo, ctrl: Array, q: Array, v: Array, drive: Drive = "position") -> Bools:
+    """Return whether the limit clips in a step: it is decided with the state at its start.
+
+        position:  |kp (u - q)| > limit,  with speed |kp (u - q) - kd v| > limit
+        torque:    |u| > limit
+
+    Args:
+        servo: The servo.
+        ctrl: Commands u of the step [rad or N m].
+        q: Motor angles before the step [rad].
+        v: Motor rates before the step [rad/s].
+        drive: What the commands are.
+
+    Returns:
+        Of the arguments' shape.
+    """
+    if servo.limit is None:
+        return np.zeros(np.shape(ctrl), dtype=bool)
+    return np.abs(_asked(servo, ctrl, q, v, drive)) > servo.limit
 
 
 def applied_torque(
-    servo: Servo, integrator: Integrator, ctrl: Array, q: Array, q_next: Array, v_next: Array
+    servo: Servo,
+    integrator: Integrator,
+    ctrl: Array,
+    q: Array,
+    v: Array,
+    q_next: Array,
+    v_next: Array,
+    drive: Drive = "position",
 ) -> Array:
     """Return the motor torque that MuJoCo's integrator applied over a step.
 
     The actuator sensor shows kp (u - q), the force before the implicit update; what enters the
     step's momentum balance is, with (q, v) before the step and (q+, v+) after it,
 
-        discrete:      tau = kp (u - q+) - kd v+
-        implicitfast:  tau = kp (u - q) - kd v+
+        discrete:      tau = kp (u - q+) - kd v+ - (limit / speed) v+
+        implicitfast:  tau = kp (u - q)  - kd v+ - (limit / speed) v+
+        torque drive:  tau = u - (limit / speed) v+
 
-    Whether the limit clips is decided with q at the start of the step under both: where
-    |kp (u - q)| > limit, the first term is limit sign(u - q).
+    Where the limit clips (see `saturated`) the terms that it clips are limit, with their sign at
+    the start of the step: with speed kp and kd, without it kp alone, in torque drive u.
 
     Args:
-        servo: The servo's gains.
+        servo: The servo.
         integrator: MuJoCo's integrator of the run.
-        ctrl: Setpoints u of the step [rad].
+        ctrl: Commands u of the step [rad or N m].
         q: Motor angles before the step [rad].
+        v: Motor rates before the step [rad/s].
         q_next: Motor angles after it [rad].
         v_next: Motor rates after it [rad/s].
+        drive: What the commands are.
 
     Returns:
         Torque of each motor [N m], of the arguments' shape.
     """
-    at_start = servo.kp * (ctrl - q)
-    spring = servo.kp * (ctrl - q_next) if integrator == "discrete" else at_start
+    asked = _asked(servo, ctrl, q_next if integrator == "discrete" else q, v_next, drive)
     if servo.limit is not None:
-        clipped = np.abs(at_start) > servo.limit
-        spring = np.where(clipped, np.sign(at_start) * servo.limit, spring)
-    return spring - servo.kd * v_next
+        side = np.sign(_asked(servo, ctrl, q, v, drive))
+        asked = np.where(saturated(servo, ctrl, q, v, drive), side * servo.limit, asked)
+    return asked - servo.passive(drive) * v_next
+
+
+def _asked(servo: Servo, ctrl: Array, q: Array, v: Array, drive: Drive) -> Array:
+    """Return what the limit clips [N m]."""
+    if drive == "torque":
+        return ctrl
+    spring = servo.kp * (ctrl - q)
+    return spring if servo.speed is None else spring - servo.kd * v

@@ -1,21 +1,20 @@
-"""Steps of many legs at once: setpoints in, the whole state of every step out."""
+"""Steps of many legs at once: commands in, the whole state of every step out."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
 from mujoco.batch import Batch
 
-from fivebar_sim.arrays import Array
+from fivebar_sim.arrays import Array, Bools
 from fivebar_sim.errors import ArgumentError, DivergedError
+from fivebar_sim.model import quiet
 
-STATE = mujoco.mjtState.mjSTATE_FULLPHYSICS
-"""What is recorded of every step: time, qpos, qvel."""
-
+STATE = mujoco.mjtState.mjSTATE_FULLPHYSICS | mujoco.mjtState.mjSTATE_CTRL
+"""What is recorded of every step: time, qpos, qvel, ctrl."""
 
 CHUNK = 50_000
 """Steps, over all legs, between two moments at which an interrupt is heard: about 0.2 s."""
@@ -28,13 +27,91 @@ class States(NamedTuple):
         time: [s], (nsim, N).
         qpos: [rad] (hinges), (nsim, N, nq).
         qvel: [rad/s], (nsim, N, nv).
-        warnings: MuJoCo's warnings of each simulation, (nsim,).
+        ctrl: The commands of the step, (nsim, N, nu).
+        ground: Force (x, z) of the ground on the foot during the step [N], (nsim, N, 2); without a
+            ground (nsim, N, 0).
+        warnings: MuJoCo's warnings of each simulation so far, (nsim,).
     """
 
     time: Array
     qpos: Array
     qvel: Array
+    ctrl: Array
+    ground: Array
     warnings: Array
+
+    @classmethod
+    def joined(cls, parts: Sequence[States]) -> States:
+        """Return the states of steps that follow each other as one."""
+        *fields, warnings = zip(*parts, strict=True)
+        return cls(*(np.concatenate(field, axis=1) for field in fields), warnings=warnings[-1])
+
+    def rows(self, which: slice | list[int]) -> States:
+        """Return some of the simulations."""
+        return States(*(field[which] for field in self))
+
+
+class Legs:
+    """Legs that are stepped together, begun at rest.
+
+    Every simulation gives the same bits alone, in a batch, and on any number of threads.
+
+    Args:
+        models: One model for all simulations, or one each (of one structure and timestep).
+        qpos: Start poses, (nsim, nq).
+        nthread: Threads; 0 is one for every processor.
+
+    Raises:
+        ArgumentError: Poses that do not fit the model.
+    """
+
+    def __init__(
+        self,
+        models: mujoco.MjModel | Sequence[mujoco.MjModel],
+        qpos: Array,
+        nthread: int = 1,
+    ) -> None:
+        shared = isinstance(models, mujoco.MjModel)
+        first: Any = models if shared else models[0]
+        if qpos.ndim != 2 or qpos.shape[1] != first.nq:
+            raise ArgumentError(f"qpos must have shape (nsim, {first.nq}), got {qpos.shape}")
+        self._batch = Batch(first, len(qpos), nthread)
+        if not shared:
+            self._batch.set_models(list(models))
+        self._batch.qpos = qpos
+        self._sizes = first.nq, first.nv, first.nu
+        ground = mujoco.mj_name2id(first, mujoco.mjtObj.mjOBJ_SENSOR, "ground")
+        self._ground = None if ground < 0 else int(first.sensor_adr[ground]) + 1  # after "found"
+
+    def advance(self, ctrl: Array) -> States:
+        """Return the states of the next steps.
+
+        Args:
+            ctrl: Commands of each of them, (nsim, n, nu).
+
+        Raises:
+            ArgumentError: Commands of another shape, or that are not finite.
+        """
+        (nq, nv, nu), nsim = self._sizes, self._batch.nsim
+        if ctrl.ndim != 3 or ctrl.shape[::2] != (nsim, nu):
+            raise ArgumentError(f"ctrl must have shape ({nsim}, N, {nu}), got {ctrl.shape}")
+        if not np.isfinite(ctrl).all():
+            raise ArgumentError("ctrl must be finite: MuJoCo would reset the leg and go on")
+        record = (STATE,) if self._ground is None else (STATE, "sensordata")
+        with quiet():
+            out = self._batch.rollout(ctrl.shape[1], ctrl, record=record)
+        state, start = out[STATE], self._ground
+        ground = state[..., :0]
+        if start is not None:
+            ground = out["sensordata"][..., [start, start + 2]]
+        return States(
+            time=state[..., 0],
+            qpos=state[..., 1 : 1 + nq],
+            qvel=state[..., 1 + nq : 1 + nq + nv],
+            ctrl=state[..., -nu:],
+            ground=ground,
+            warnings=self._batch.warning[..., 1].sum(axis=1),  # (last info, count) of each kind
+        )
 
 
 def simulate(
@@ -43,63 +120,58 @@ def simulate(
     ctrl: Array,
     nthread: int = 1,
 ) -> States:
-    """Return the states of legs that start at rest and follow their setpoints.
-
-    Every simulation gives the same bits alone, in a batch, and on any number of threads.
+    """Return the states of legs that start at rest and are sent a table of commands.
 
     Args:
         models: One model for all simulations, or one each (of one structure and timestep).
         qpos: Start poses, (nsim, nq).
-        ctrl: Setpoints of every step, (nsim, N, nu).
+        ctrl: Commands of every step, (nsim, N, nu).
         nthread: Threads; 0 is one for every processor.
 
     Raises:
-        ArgumentError: Shapes that do not fit, or setpoints that are not finite.
+        ArgumentError: Shapes that do not fit, or commands that are not finite.
     """
-    shared = isinstance(models, mujoco.MjModel)
-    first: Any = models if shared else models[0]
-    nsim, nq = len(qpos), first.nq
-    if qpos.shape != (nsim, nq) or ctrl.ndim != 3 or ctrl.shape[::2] != (nsim, first.nu):
-        raise ArgumentError(
-            f"qpos must have shape (nsim, {nq}) and ctrl (nsim, N, {first.nu}), "
-            f"got {qpos.shape} and {ctrl.shape}"
-        )
-    if not np.isfinite(ctrl).all():
-        raise ArgumentError("ctrl must be finite: MuJoCo would reset the leg and go on")
-    batch = Batch(first, nsim, nthread)
-    if not shared:
-        batch.set_models(list(models))
-    batch.qpos = qpos
-    with _warnings_kept():
-        state = np.concatenate(list(_chunks(batch, ctrl)), axis=1)
-    return States(
-        time=state[..., 0],
-        qpos=state[..., 1 : 1 + nq],
-        qvel=state[..., 1 + nq : 1 + nq + first.nv],
-        warnings=batch.warning[..., 1].sum(axis=1),  # (last info, count) of each kind
-    )
+    legs = Legs(models, qpos, nthread)
+    if ctrl.ndim != 3:
+        legs.advance(ctrl)
+    return States.joined([legs.advance(part) for part in _chunks(ctrl)])
 
 
-def _chunks(batch: Batch, ctrl: Array) -> Iterator[Array]:
-    """Yield the states of some steps after the other, so that Ctrl-C is heard in between."""
+def _chunks(ctrl: Array) -> Iterator[Array]:
+    """Yield some steps after the other, so that Ctrl-C is heard in between."""
     length = max(1, CHUNK // len(ctrl))
     for start in range(0, ctrl.shape[1], length):
-        part = ctrl[:, start : start + length]
-        yield batch.rollout(part.shape[1], part, record=(STATE,))[STATE]
+        yield ctrl[:, start : start + length]
 
 
-@contextmanager
-def _warnings_kept() -> Iterator[None]:
-    """Keep MuJoCo from printing warnings and logging them in the working directory.
+def simulate_asking(
+    models: mujoco.MjModel | Sequence[mujoco.MjModel],
+    qpos: Array,
+    steps: int,
+    ask: Callable[[int, States | None], Array | None],
+    nthread: int = 1,
+) -> States:
+    """Return the states of legs whose commands depend on how they move.
 
-    They are counted in `States.warnings`.
+    Args:
+        models: One model for all simulations, or one each (of one structure and timestep).
+        qpos: Start poses, (nsim, nq).
+        steps: N.
+        ask: Given k and the states since it was last asked (None at k = 0), returns the commands
+            of the steps from k on, (nsim, n, nu), n as it likes; None ends the run early.
+        nthread: Threads; 0 is one for every processor.
+
+    Raises:
+        ArgumentError: Shapes that do not fit, or commands that are not finite.
     """
-    before = mujoco.get_mju_user_warning()
-    mujoco.set_mju_user_warning(lambda message: None)
-    try:
-        yield
-    finally:
-        mujoco.set_mju_user_warning(before)
+    legs, parts, k = Legs(models, qpos, nthread), [], 0
+    while k < steps:
+        ctrl = ask(k, parts[-1] if parts else None)
+        if ctrl is None:
+            break
+        parts.append(legs.advance(ctrl[:, : steps - k]))
+        k += ctrl.shape[1]
+    return States.joined(parts)
 
 
 SPEED_LIMIT = 1e4
@@ -114,11 +186,7 @@ def check(states: States, timestep: float) -> None:
     Raises:
         DivergedError: With the time of the first bad step.
     """
-    steps = np.arange(1, states.time.shape[1] + 1)
-    on_time = np.abs(states.time - steps * timestep) < 0.5 * timestep
-    finite = np.isfinite(states.qpos).all(-1) & np.isfinite(states.qvel).all(-1)
-    slow = np.abs(np.nan_to_num(states.qvel, nan=np.inf)).max(-1) < SPEED_LIMIT
-    bad = ~(on_time & finite & slow)
+    bad = ~_sound(states, timestep)
     if bad.any():
         k = int(np.argmax(bad.any(axis=0)))
         raise DivergedError(
@@ -130,5 +198,22 @@ def check(states: States, timestep: float) -> None:
     if states.warnings.any():
         raise DivergedError(
             f"MuJoCo gave {int(states.warnings.sum())} warnings in the last step",
-            float(steps[-1] * timestep),
+            states.time.shape[1] * timestep,
         )
+
+
+def is_broken(states: States) -> bool:
+    """Return whether a simulation broke down in these steps."""
+    return not (_moves(states).all() and not states.warnings.any())
+
+
+def _sound(states: States, timestep: float) -> Bools:
+    """Return which states, from the first step on, are finite, slow enough and on time."""
+    steps = np.arange(1, states.time.shape[1] + 1)
+    return (np.abs(states.time - steps * timestep) < 0.5 * timestep) & _moves(states)
+
+
+def _moves(states: States) -> Bools:
+    """Return which states are finite and slow enough."""
+    finite = np.isfinite(states.qpos).all(-1) & np.isfinite(states.qvel).all(-1)
+    return finite & (np.abs(np.nan_to_num(states.qvel, nan=np.inf)).max(-1) < SPEED_LIMIT)

@@ -91,7 +91,7 @@ def test_highest_status_counts(shell: Shell) -> None:
     )
     said = shell("run", "wild.toml", "short.toml", "--out", "all")
     assert said.status == 1
-    assert said.err.startswith("fivebar: wild: the simulation broke down at t = ")
+    assert said.err.startswith("fivebar: wild: the foot left its path at t = ")
     assert {name for name in shell.names() if name.startswith("all/")} == {
         *("all/short", *(f"all/short/{file}" for file in FILES))
     }
@@ -137,7 +137,7 @@ def test_markup_in_names_is_shown_as_it_is(shell: Shell) -> None:
             "short.toml: leg.preset: unknown leg preset 'dogg'; known: airhockey, classic",
         ),
         ("path.kind=square", "short.toml: path.kind: unknown path 'square'; known: circle, csv,"),
-        ("controller.name=pid", "short.toml: controller.name: unknown controller 'pid'; known: s"),
+        ("controller.name=pid", "short.toml: controller.name: unknown controller 'pid'; known: c"),
         ("nonsense", "--set takes KEY=VALUE, got 'nonsense'"),
         ("name=a\tb", "short.toml: name must be a plain file name of 1 to 200 bytes, got 'a\\tb'"),
     ],
@@ -157,7 +157,7 @@ def test_wrong_input_is_one_line(shell: Shell, settings: str, message: str) -> N
         ),
         (CSV.replace("0.4", "0.1"), ", line 4: times are not sorted: time_s must be > 0.2 s"),
         (CSV.replace("0.4", "0.2"), ", line 4: times are repeated: time_s must be > 0.2 s"),
-        (CSV[:25], ": a path needs at least 2 rows"),
+        (CSV[:25], ": a foot path needs at least 2 rows, got 1"),
     ],
 )
 def test_wrong_csv_is_one_line(shell: Shell, text: str, message: str) -> None:
@@ -168,7 +168,9 @@ def test_wrong_csv_is_one_line(shell: Shell, text: str, message: str) -> None:
 
 def test_diverging_timestep_exits_1_and_leaves_nothing(shell: Shell) -> None:
     said = shell.refused("run", "short.toml", *DIVERGING, "--quiet", status=1)
-    assert said.startswith("short: the simulation broke down at t = 0.1 s: ")
+    assert said.startswith(
+        "short: the foot left its path at t = 0.02 s; the simulation broke down at t = 0.1 s: "
+    )
     assert "try a timestep below 0.02 s" in said
 
 

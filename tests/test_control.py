@@ -142,7 +142,8 @@ def test_two_controllers_of_one_name_are_refused(plug: Plug) -> None:
 def test_unknown_controller_is_refused_with_the_known_ones(plug: Plug) -> None:
     plug("strangers", {"ahead": "strangers:Ahead"})
     assert refused("controller.name=ahaed") == (
-        "classic-ellipse: controller.name: unknown controller 'ahaed'; known: ahead, servo "
+        "classic-ellipse: controller.name: unknown controller 'ahaed'; known: ahead, "
+        "computed_torque, gain_schedule, gravity_compensation, impedance, pd, servo "
         "(did you mean 'ahead'?)"
     )
 

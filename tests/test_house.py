@@ -35,6 +35,13 @@ PURE = (
     "following",
     "servo_table",
     "paths",
+    "forces",
+    "load",
+    "ground",
+    "scenes",
+    "sensors",
+    "servo",
+    "control_step",
 )
 HEAVY = {"mujoco", "rerun", "matplotlib", "scipy"}
 

@@ -109,7 +109,7 @@ def test_setpoint_timing_is_the_better_one(integrator: str) -> None:
     planned = rollout.plan(scenario)
     best = rollout.execute(planned).metrics["tracking"]["rms"]
     for shift in (-1, 1):
-        moved = planned._replace(ctrl=np.roll(planned.ctrl, shift, axis=0))
+        moved = planned._replace(setpoints=np.roll(planned.ctrl, shift, axis=0))
         assert rollout.execute(moved).metrics["tracking"]["rms"] > 5.0 * best
 
 

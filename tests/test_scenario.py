@@ -16,6 +16,7 @@ from fivebar_sim.errors import ConfigError
 from fivebar_sim.geometry import FiveBar
 from fivebar_sim.paths import Circle, Csv, Ellipse
 from fivebar_sim.scenario import MOST_STEPS, Scenario, Sim, copied_name
+from fivebar_sim.scenes import Air
 from fivebar_sim.servo import Servo
 
 ELLIPSE = """
@@ -52,7 +53,7 @@ def test_what_is_left_out_takes_defaults(tmp_path: Path) -> None:
     loaded = scenario(tmp_path)
     assert loaded.name == "short"  # as the file
     assert loaded.leg == FiveBar.load("classic")
-    assert (loaded.scene, loaded.duration, loaded.controller_name) == ("air", 0.6, "servo")
+    assert (loaded.scene, loaded.duration, loaded.controller_name) == (Air(), 0.6, "servo")
     assert (loaded.servo, loaded.sim, loaded.limits) == (Servo(), Sim(), {})
     assert loaded.steps == 600
     assert scenario(tmp_path, text=ELLIPSE.replace("duration = 0.6", "")).duration == 4.0
@@ -204,10 +205,13 @@ def test_name_that_is_no_file_name_is_refused(tmp_path: Path, name: str) -> None
 @pytest.mark.parametrize(
     ("setting", "message"),
     [
-        ("duratoin=1", "unknown key 'duratoin'; known: controller, duration, leg, limits, name,"),
+        ("duratoin=1", "unknown key 'duratoin'; known: controller, duration, force, leg,"),
         ("name=1", "name must be a plain file name of 1 to 200 bytes, got 1"),
-        ("scene=aire", "unknown scene 'aire'; known: air (did you mean 'air'?)"),
-        ("scene=[1]", "unknown scene '[1]'; known: air"),
+        (
+            "scene=aire",
+            "unknown scene 'aire'; known: air, payload, rail, treadmill (did you mean 'air'?)",
+        ),
+        ("scene=[1]", "scene must be the name of a kind or a table, got [1]"),
         ("duration=0", "duration must be in (0, inf) s, got 0"),
         ("duration=true", "duration must be in (0, inf) s, got True"),
         ("duration='4'", "duration must be in (0, inf) s, got '4'"),
@@ -220,7 +224,7 @@ def test_name_that_is_no_file_name_is_refused(tmp_path: Path, name: str) -> None
         ("sim.seed=-1", "sim.seed must be in [0, inf), got -1"),
         ("sim.integrator=euler", "sim.integrator must be one of 'discrete', 'implicitfast', got"),
         ("leg=clasic", "leg.preset: unknown leg preset 'clasic'; known: airhockey, classic,"),
-        ("leg=1", "leg must be a preset's name or a table, got 1"),
+        ("leg=1", "leg must be the name of a preset or a table, got 1"),
         ("leg.preset=[]", "leg.preset must be a preset's name, got []"),
         ("leg=no.toml", "leg.preset: cannot read leg "),
         ("leg=folder.toml", "leg.preset: cannot read leg "),
@@ -231,7 +235,7 @@ def test_name_that_is_no_file_name_is_refused(tmp_path: Path, name: str) -> None
         ("leg.L1=nan", "leg.L1 must be finite, got nan"),
         ("leg.L2=10", "[leg]: L2: the links can never close: the longest may be at most"),
         ("leg.gravity=[nan,0]", "leg.gravity must be finite, got [nan, 0]"),
-        ("path=1", "[path] needs a kind; known: circle, csv, ellipse, figure-eight, line"),
+        ("path=1", "[path] needs a kind; known: circle, csv, ellipse, figure-eight, gait"),
         ("path.kind=elipse", "path.kind: unknown path 'elipse'; known: circle, csv, ellipse,"),
         ("path.kind=[]", "path.kind: unknown path '[]'; known: circle"),
         ("path.kind=circle", "path.radius is missing"),
@@ -245,10 +249,10 @@ def test_name_that_is_no_file_name_is_refused(tmp_path: Path, name: str) -> None
         ("servo.kp=0", "servo.kp must be in (0, inf) N m/rad, got 0.0"),
         ("servo.kd=-1", "servo.kd must be in [0, inf) N m s/rad, got -1.0"),
         ("servo.limit=0", "servo.limit must be in (0, inf) N m, got 0.0"),
-        ("servo.preset=xl330", "[servo]: unknown key 'preset'; known: kd, kp, limit"),
+        ("servo.preset=xl", "servo.preset: unknown servo preset 'xl'; known: hobby-9g, ideal,"),
         ("controller=servo", "controller must be a table, got 'servo'"),
-        ("controller.name=servoo", "controller.name: unknown controller 'servoo'; known: servo"),
-        ("controller.name={}", "controller.name: unknown controller '{}'; known: servo"),
+        ("controller.name=servoo", "controller.name: unknown controller 'servoo'; known: computed"),
+        ("controller.name={}", "controller.name: unknown controller '{}'; known: computed"),
         ("controller.gain=1", "[controller]: unknown key 'gain'; known: feedforward"),
         ("controller.feedforward=all", "controller.feedforward must be one of 'none', 'velocity'"),
         ("limits.tracking.rm=1", "[limits]: unknown key 'tracking.rm'; known: branch.flips,"),

@@ -116,7 +116,7 @@ def test_refusal_of_setpoints_that_are_not_finite() -> None:
     ctrl[7, 1] = np.nan
     with pytest.raises(ArgumentError, match="ctrl must be finite"):
         simulate.simulate(plan.model, plan.motion.q[:1], ctrl[None])
-    with pytest.raises(ArgumentError, match=r"ctrl \(nsim, N, 2\)"):
+    with pytest.raises(ArgumentError, match=r"ctrl must have shape \(1, N, 2\)"):
         simulate.simulate(plan.model, plan.motion.q[:1], ctrl)
 
 
@@ -126,6 +126,8 @@ def states(**changes: np.ndarray) -> States:
         time=np.arange(1.0, 11.0)[None] * 1e-3,
         qpos=np.zeros((1, 10, 4)),
         qvel=np.zeros((1, 10, 4)),
+        ctrl=np.zeros((1, 10, 2)),
+        ground=np.zeros((1, 10, 0)),
         warnings=np.zeros(1, dtype=int),
     )
     simulate.check(good, 1e-3)

@@ -1,0 +1,154 @@
+"""Legs in the loop: their controllers are asked at every control step."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, NamedTuple, cast
+
+import numpy as np
+
+from fivebar_sim.arrays import Array
+from fivebar_sim.control import Feedback, Reference
+from fivebar_sim.control_step import ControlStep, whole_steps
+from fivebar_sim.errors import ConfigError, DivergedError, FiveBarError, PoseError
+from fivebar_sim.motion import Motion
+from fivebar_sim.record import broken
+from fivebar_sim.simulate import States, is_broken, simulate_asking
+
+if TYPE_CHECKING:
+    from fivebar_sim.rollout import Plan
+
+MOTORS = [-4, -2]
+"""Where qpos and qvel have A and E."""
+
+
+class _Group(NamedTuple):
+    """Plans whose leg, servo, sensors, controller and payload are equal: one call answers all."""
+
+    rows: list[int]
+    plan: Plan
+    controller: Feedback
+    step: ControlStep
+    wanted: Reference
+
+
+def steer(plans: Sequence[Plan], nthread: int) -> States:
+    """Return the states of plans with feedback controllers of one timestep, length and period.
+
+    Raises:
+        ConfigError: A controller that fails, or commands what is no finite (nsim, 2).
+        DivergedError: A controller that cannot answer, as where the loop would not close.
+    """
+    groups = _groups(plans)
+    every, steps, h = groups[0].step.every, plans[0].scenario.steps, plans[0].motion.timestep
+    past: list[States] = []
+
+    def ask(k: int, states: States | None) -> Array | None:
+        if states is not None:
+            past.append(states)
+            if is_broken(states):
+                return None  # what broke, and when, is found out by who looks at the states
+        n = min(every, steps - k)
+        ctrl = np.empty((len(plans), n, plans[0].model.nu))
+        for row, plan in enumerate(plans):
+            ctrl[row, :, :-2] = plan.pushes[k : k + n]
+        for group in groups:
+            if states is not None:
+                theta = states.qpos[group.rows][..., MOTORS]
+                group.step.moved(theta, states.qvel[group.rows][..., MOTORS])
+            try:
+                command = _command(group, k)
+            except PoseError as error:
+                row = group.rows[error.index[0] if error.index else 0]
+                why = f"controller {plans[row].scenario.controller_name!r} has no answer: {error}"
+                stopped = DivergedError(why, k * h)
+                if not past:
+                    raise stopped from error
+                raise broken(plans[row], States.joined(past).rows([row]), stopped) from error
+            ctrl[group.rows, :, -2:] = group.step.send(k, command)
+        return ctrl
+
+    start = np.stack([plan.start for plan in plans])
+    return simulate_asking([plan.model for plan in plans], start, steps, ask, nthread)
+
+
+def period_steps(plan: Plan) -> int:
+    """Return the timesteps of a plan's control period.
+
+    Raises:
+        ArgumentError: It is no whole number of them.
+    """
+    controller = cast(Feedback, plan.scenario.controller)
+    return whole_steps("controller.period", controller.period, plan.motion.timestep)
+
+
+def _groups(plans: Sequence[Plan]) -> list[_Group]:
+    """Return the plans by what they have in common."""
+    rows: list[tuple[tuple, list[int]]] = []
+    for row, plan in enumerate(plans):
+        s = plan.scenario
+        key = (s.leg, s.servo, s.sensors, s.controller, plan.motion.payload)
+        same = next((members for known, members in rows if known == key), None)
+        if same is None:
+            rows.append((key, [row]))
+        else:
+            same.append(row)
+    return [_group([plans[row] for row in members], members) for _, members in rows]
+
+
+def _group(plans: list[Plan], rows: list[int]) -> _Group:
+    plan, s = plans[0], plans[0].scenario
+    controller = cast(Feedback, s.controller)
+    step = ControlStep(
+        s.servo,
+        s.sensors,
+        controller.drive,
+        timestep=plan.motion.timestep,
+        every=period_steps(plan),
+        steps=s.steps,
+        start=np.stack([p.motion.q[0, ::2] for p in plans]),
+        seeds=[p.scenario.sim.seed for p in plans],
+    )
+    return _Group(rows, plan, controller, step, _references([p.motion for p in plans]))
+
+
+def _references(motions: list[Motion]) -> Reference:
+    """Return the references of all steps, arrays of shape (nsim, N + 1, 2)."""
+    q, q_dot, q_ddot = (
+        np.stack([getattr(m, name)[:, ::2] for m in motions]) for name in ("q", "q_dot", "q_ddot")
+    )
+    foot, foot_dot, foot_ddot, force = (
+        np.stack([getattr(m, name) for m in motions])
+        for name in ("foot", "foot_dot", "foot_ddot", "force")
+    )
+    payload = np.array([m.payload for m in motions])
+    return Reference(foot, foot_dot, foot_ddot, q, q_dot, q_ddot, force, float(payload[0]))
+
+
+def _command(group: _Group, k: int) -> Array:
+    """Return what a controller commands at step k, checked, (nsim, 2).
+
+    Raises:
+        PoseError: It has no answer in a pose, or one that is not finite.
+        ConfigError: It fails otherwise, or answers with another shape.
+    """
+    s, shape = group.plan.scenario, (len(group.rows), 2)
+    arrays = [field[:, k] for field in group.wanted[:-1]]
+    wanted = Reference(*arrays, payload=group.wanted.payload)
+    name = f"controller {s.controller_name!r}"
+    try:
+        answer = group.controller.command(s.leg, s.servo, group.step.observe(k), wanted)
+    except FiveBarError:
+        raise
+    except Exception as error:  # a user's code may raise anything
+        raise ConfigError(f"{name} failed: {type(error).__name__}: {error}") from error
+    command = np.asarray(answer)
+    if command.dtype.kind not in "fiu" or command.shape != shape:
+        raise ConfigError(
+            f"{name} must command numbers of shape {shape}, got {command.dtype} of shape "
+            f"{command.shape}"
+        )
+    bad = ~np.isfinite(command).all(axis=1)
+    if bad.any():
+        raise PoseError("its command is not finite", (int(np.argmax(bad)),))
+    return command

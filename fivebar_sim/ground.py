@@ -1,0 +1,66 @@
+"""What the foot does on the ground: force, slip, height, stance and flight, from the record."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from fivebar_sim.arrays import Array, Bools
+from fivebar_sim.geometry import FiveBar
+
+
+def stands(record: Mapping[str, Array]) -> Bools:
+    """Return in which steps the ground carried the foot, (N,)."""
+    return record["ground_z"] > 0.0
+
+
+def height(leg: FiveBar, record: Mapping[str, Array]) -> Array:
+    """Return the height of the foot's ball above the floor [m], (N,); below 0 it sinks in."""
+    return record["hip_z"] + record["foot_z"] - leg.foot_radius
+
+
+def slid(leg: FiveBar, record: Mapping[str, Array]) -> Array:
+    """Return how far the foot slid over the floor in each step but the first [m], (N - 1,).
+
+    The ball of radius r rolls with L2, whose direction is psi_2 = theta_A + theta_B; a belt that
+    moves by belt_x takes its point of contact along:
+
+        foot_x + r psi_2 - belt_x, after the step less before it
+    """
+    psi_2 = record["theta_A"] + record["theta_B"]
+    belt = record.get("belt_x", np.zeros_like(psi_2))
+    return np.diff(record["foot_x"] + leg.foot_radius * psi_2 - belt)
+
+
+def measure(leg: FiveBar, record: Mapping[str, Array], window: slice) -> dict[str, Any]:
+    """Return the metrics of the ground.
+
+    force_max, foot_height_max and flight_max (the longest time between two stances) are of the
+    whole run, whose landing may be before the window; stance_share (of the time) and slip (the way
+    that the foot slid while it stood) are of the window.
+
+    Args:
+        leg: The leg.
+        record: The columns of rollout.parquet.
+        window: The rows that load is measured over.
+    """
+    down, h = stands(record), float(record["time"][0])
+    slip = np.concatenate([[0.0], np.abs(slid(leg, record)) * down[1:]])[window]
+    return {
+        "force_max": {
+            "x": float(np.abs(record["ground_x"]).max()),
+            "z": float(record["ground_z"].max()),
+        },
+        "stance_share": float(down[window].mean()),
+        "slip": float(slip.sum()),
+        "foot_height_max": float(height(leg, record).max()),
+        "flight_max": h * _longest(~down),
+    }
+
+
+def _longest(chosen: Bools) -> int:
+    """Return the length of the longest run of True."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], chosen, [False]])))
+    return int((edges[1::2] - edges[::2]).max(initial=0))

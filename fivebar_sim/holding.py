@@ -1,0 +1,44 @@
+"""Whether servos with a torque limit can hold the leg at all, before anything is simulated."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fivebar_sim import dynamics
+from fivebar_sim.arrays import Array
+from fivebar_sim.errors import ConfigError
+from fivebar_sim.motion import Motion
+from fivebar_sim.scenario import Scenario
+from fivebar_sim.scenes import Ground
+
+
+def check(scenario: Scenario, wanted: Motion) -> None:
+    """Raise unless the torque limit holds the leg at rest in every pose of its motion.
+
+    In the air that is the weight of leg and payload; on the ground, at the start, the trunk's.
+
+    Raises:
+        ConfigError: The limit is too small; says where and what it takes.
+    """
+    limit = scenario.servo.limit
+    if limit is None:
+        return
+    torque = _holding(scenario, wanted)
+    worst = np.abs(torque).max(axis=1)
+    k = int(np.argmax(worst))
+    if worst[k] > limit:
+        name = "AE"[int(np.argmax(np.abs(torque[k])))]
+        raise ConfigError(
+            f"servo.limit cannot hold the leg at t = {wanted.time[k]:g} s: motor {name} must give "
+            f"at least {worst[k]:.4g} N m there at rest, got a limit of {limit:g} N m"
+        )
+
+
+def _holding(scenario: Scenario, wanted: Motion) -> Array:
+    """Return the torques that hold the poses of a motion [N m], (N + 1, 2)."""
+    leg, theta, scene = scenario.leg, wanted.q[:, ::2], scenario.scene
+    rest = np.zeros(2)
+    if not isinstance(scene, Ground):
+        return dynamics.inverse(leg, theta, rest, rest, payload=wanted.payload)
+    weight = (scene.mass + sum(link.mass for link in leg.links)) * -np.array(leg.gravity)
+    return dynamics.inverse(leg, theta[:1], rest, rest, (0.0, weight[1]))

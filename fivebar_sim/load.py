@@ -1,0 +1,230 @@
+"""How the two motors share the load: torques, shares, work, and one motor against the other.
+
+The torque of a step acts over the whole of it, so its work is the torque times the turn, exactly.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from fivebar_sim.arrays import Array, Bools, at, first_index
+from fivebar_sim.checks import check_number
+from fivebar_sim.errors import ArgumentError
+
+TINY = 1e-6
+"""Torque or work of at most this part of the window's largest counts as none: it is the rounding
+of the setpoints and the softness of the loop, and its share would say nothing."""
+
+LARGEST = 1e9
+"""Upper end of torques [N m] and angles [rad]."""
+
+BINS_MAX = 1000
+"""Upper end of the number of phase bins."""
+
+MOTORS = ("A", "E")
+
+
+class _Steps(NamedTuple):
+    """What the motors did in every step of a window.
+
+    Attributes:
+        torque: (tau_A, tau_E) [N m], (N, 2).
+        work: Of either motor [J], (N, 2).
+        against: In which steps one motor drove and the other braked, (N,).
+        peak: Largest |torque| of the window [N m].
+        timestep: [s].
+    """
+
+    torque: Array
+    work: Array
+    against: Bools
+    peak: float
+    timestep: float
+
+
+def measure(
+    torque: ArrayLike,
+    theta: ArrayLike,
+    timestep: float,
+    *,
+    stance: ArrayLike | None = None,
+    phase: ArrayLike | None = None,
+    bins: int = 8,
+) -> dict[str, Any]:
+    """Return how motors A and E shared the load over a window of N steps.
+
+    With tau the torque of a motor and W = tau (theta after the step - theta before it), sums over
+    the steps, positive and negative ones apart where it says so:
+
+        torque_rms = sqrt(mean tau^2),   torque_peak = max |tau|,   of A and of E
+        share_A = sum |tau_A| / (sum |tau_A| + sum |tau_E|),   thermal_share_A the same of tau^2
+        peak_ratio, rms_ratio = the larger of the two motors' / the smaller, so 1 is even
+        work.A.positive = sum max(W_A, 0),   negative = sum min(W_A, 0),   net = their sum
+        opposing: of the steps with W_A W_E < 0, one motor driving and the other braking,
+            fraction = how many of all,   first = start of the first, from the window's [s],
+            energy = sum min(|W_A|, |W_E|), what went from one motor to the other [J]
+
+    What is not defined is None: a share where neither torque passes `TINY` of the window's peak, a
+    ratio where the smaller does not, `first` if there is none, and everything where no step is.
+
+    Args:
+        torque: (tau_A, tau_E) of every step [N m], (N, 2), N at least 1.
+        theta: (theta_A, theta_E) before the first step and after every one [rad], (N + 1, 2);
+            continuous, not wrapped.
+        timestep: [s].
+        stance: In which steps the foot stands, (N,) bools: "stance" is then the same in those.
+        phase: Of every step in its gait cycle, in [0, 1), (N,): "phase" then has share_A and
+            torque_rms of A and of E in each bin.
+        bins: How many; bin i is [i, i + 1) / bins.
+
+    Raises:
+        ArgumentError: Other shapes, numbers outside their range or not finite, no steps.
+    """
+    steps = _steps(torque, theta, timestep)
+    rows = len(steps.torque)
+    measured = whole = _over(steps, np.ones(rows, dtype=bool))
+    if stance is not None:
+        chosen = _mask(stance, rows)
+        part = _over(steps, chosen) if chosen.any() else _undefined(whole)
+        measured = {**measured, "stance": part}
+    if phase is not None:
+        measured = {**measured, "phase": _histogram(steps, phase, bins)}
+    return measured
+
+
+def _steps(torque: ArrayLike, theta: ArrayLike, timestep: float) -> _Steps:
+    """Return the steps of a window, checked."""
+    check_number("timestep", timestep, "s", low=0.0, high=LARGEST, strict=True)
+    tau, angles = _pairs(torque, "torque", "N m"), _pairs(theta, "theta", "rad")
+    if not len(tau):
+        raise ArgumentError("torque must have at least one row, got none")
+    if len(angles) != len(tau) + 1:
+        raise ArgumentError(
+            f"theta must have one row more than torque, before and after every step: shape "
+            f"{(len(tau) + 1, 2)}, got {angles.shape}"
+        )
+    work = tau * np.diff(angles, axis=0)
+    return _Steps(tau, work, _against(work), float(np.abs(tau).max()), timestep)
+
+
+def _over(steps: _Steps, chosen: Bools) -> dict[str, Any]:
+    """Return the measures over the chosen steps, of which there is at least one."""
+    tau, work, against = steps.torque[chosen], steps.work[chosen], steps.against & chosen
+    floor = TINY * steps.peak
+    rms, peak = _rms(tau), np.abs(tau).max(axis=0)
+    given, taken = np.maximum(work, 0.0).sum(axis=0), np.minimum(work, 0.0).sum(axis=0)
+    return {
+        "torque_rms": _named(rms),
+        "torque_peak": _named(peak),
+        "share_A": _share(tau, floor, 1),
+        "thermal_share_A": _share(tau, floor, 2),
+        "peak_ratio": _ratio(peak, floor),
+        "rms_ratio": _ratio(rms, floor),
+        "work": {
+            motor: {"positive": gain, "negative": loss, "net": gain + loss}
+            for motor, gain, loss in zip(MOTORS, given.tolist(), taken.tolist(), strict=True)
+        },
+        "opposing": {
+            "fraction": float(steps.against[chosen].mean()),
+            "first": steps.timestep * int(np.argmax(against)) if against.any() else None,
+            "energy": float(np.abs(steps.work[against]).min(axis=1).sum()),
+        },
+    }
+
+
+def _histogram(steps: _Steps, phase: ArrayLike, bins: int) -> dict[str, Any]:
+    """Return share_A and torque_rms in bins of the gait phase, a list of each."""
+    if not isinstance(bins, (int, np.integer)) or not 1 <= bins <= BINS_MAX:
+        raise ArgumentError(f"bins must be a whole number in [1, {BINS_MAX}], got {bins!r}")
+    shape = (len(steps.torque),)
+    cycle = _numbers(phase, "phase")
+    if cycle.shape != shape:
+        raise ArgumentError(f"phase must have shape {shape}, got {cycle.shape}")
+    bad = ~((cycle >= 0.0) & (cycle < 1.0))
+    if bad.any():
+        i = first_index(bad)
+        raise ArgumentError(f"phase must be in [0, 1), got {float(cycle[i])!r}{at(i)}")
+    bin_of = (cycle * bins).astype(int)  # below bins: the float before 1 does not round up to it
+    parts = [steps.torque[bin_of == i] for i in range(bins)]
+    rms = [_named(_rms(part)) if len(part) else dict.fromkeys(MOTORS) for part in parts]
+    return {
+        "share_A": [_share(part, TINY * steps.peak, 1) for part in parts],
+        "torque_rms": {motor: [each[motor] for each in rms] for motor in MOTORS},
+    }
+
+
+def _against(work: Array) -> Bools:
+    """Return in which steps one motor gives work and the other takes it, both more than `TINY`."""
+    amount = np.abs(work)
+    real = (amount > TINY * amount.max()).all(axis=1)
+    return real & (np.signbit(work[:, 0]) != np.signbit(work[:, 1]))
+
+
+def _rms(tau: Array) -> Array:
+    """Return the root of the mean square of each column; scaled, so no square underflows."""
+    peak = float(np.abs(tau).max())
+    return peak * np.sqrt(np.mean((tau / peak) ** 2, axis=0)) if peak > 0.0 else np.zeros(2)
+
+
+def _share(tau: Array, floor: float, power: int) -> float | None:
+    """Return A's part of the sum of |tau|^power, or None if no torque is above `floor`."""
+    amount = np.abs(tau)
+    peak = float(amount.max(initial=0.0))
+    if not peak > floor:
+        return None
+    A, E = ((amount / peak) ** power).sum(axis=0).tolist()
+    return A / (A + E)
+
+
+def _ratio(pair: Array, floor: float) -> float | None:
+    """Return the larger of a pair over the smaller, or None if that is at most `floor`."""
+    small, large = sorted(pair.tolist())
+    return large / small if small > floor else None
+
+
+def _named(pair: Array) -> dict[str, float]:
+    return dict(zip(MOTORS, pair.tolist(), strict=True))
+
+
+def _undefined(measured: dict[str, Any]) -> dict[str, Any]:
+    """Return the same keys with None for every number."""
+    return {
+        key: _undefined(value) if isinstance(value, dict) else None
+        for key, value in measured.items()
+    }
+
+
+def _numbers(values: ArrayLike, name: str) -> Array:
+    try:
+        return np.asarray(values, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise ArgumentError(f"{name} must be numbers: {error}") from None
+
+
+def _pairs(values: ArrayLike, name: str, unit: str) -> Array:
+    """Return numbers of shape (N, 2), none beyond `LARGEST`."""
+    pairs = _numbers(values, name)
+    if pairs.ndim != 2 or pairs.shape[1] != len(MOTORS):
+        raise ArgumentError(f"{name} must have shape (N, 2), got {pairs.shape}")
+    bad = np.logical_not(np.abs(pairs) <= LARGEST)
+    if bad.any():
+        i, most = first_index(bad), f"{LARGEST:g}"
+        raise ArgumentError(
+            f"{name} must be in [-{most}, {most}] {unit}, got {float(pairs[i])!r}{at(i)}"
+        )
+    return pairs
+
+
+def _mask(values: ArrayLike, rows: int) -> Bools:
+    try:
+        mask = np.asarray(values)
+    except ValueError as error:
+        raise ArgumentError(f"stance must be bools of shape ({rows},): {error}") from None
+    if mask.dtype != np.bool_ or mask.shape != (rows,):
+        raise ArgumentError(
+            f"stance must be bools of shape ({rows},), got {mask.dtype} of shape {mask.shape}"
+        )
+    return mask

@@ -1,0 +1,109 @@
+"""The record of a run: the columns of rollout.parquet, from the states that were simulated."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from fivebar_sim import kinematics
+from fivebar_sim.arrays import Array, Bools
+from fivebar_sim.errors import DivergedError
+from fivebar_sim.metrics import JOINT_COLUMNS, Record, left_path
+from fivebar_sim.scenes import Ground, Treadmill
+from fivebar_sim.servo import Drive, applied_torque
+from fivebar_sim.servo import saturated as clipped
+from fivebar_sim.simulate import States
+
+if TYPE_CHECKING:
+    from fivebar_sim.rollout import Plan
+
+MOTORS = [0, 2]
+"""Where the four joints have A and E."""
+
+
+def columns(planned: Plan, states: States) -> Record:
+    """Return the record: row k is the state at t = (k + 1) h, and what the step to it did.
+
+    Foot and gap are those of qpos itself, not MuJoCo's kinematics of the step before.
+
+    Args:
+        planned: What was simulated.
+        states: Of this one simulation, of all its steps or of the first ones.
+    """
+    leg, wanted = planned.scenario.leg, planned.motion
+    q, v, ctrl = _joints(states)
+    points = kinematics.chain_points(leg, q)
+    rows = slice(1, len(q) + 1)
+    target, gap = wanted.foot[rows], points.C_right - points.C_left
+    torque = _torque(planned, states)
+    record = {
+        "time": wanted.time[rows],
+        "target_x": target[:, 0],
+        "target_z": target[:, 1],
+        "foot_x": points.F[:, 0],
+        "foot_z": points.F[:, 1],
+    }
+    record |= {name: q[:, i] for i, name in enumerate(JOINT_COLUMNS)}
+    record |= {name.replace("theta", "theta_dot"): v[:, i] for i, name in enumerate(JOINT_COLUMNS)}
+    record |= {"ctrl_A": ctrl[:, 0], "ctrl_E": ctrl[:, 1]}
+    record |= {"torque_A": torque[:, 0], "torque_E": torque[:, 1]}
+    record["gap"] = np.hypot(gap[:, 0], gap[:, 1])
+    record |= _surroundings(planned, states)
+    return {name: np.ascontiguousarray(column) for name, column in record.items()}
+
+
+def _joints(states: States) -> tuple[Array, Array, Array]:
+    """Return the leg's four joint angles, their rates, and the commands of A and E."""
+    return states.qpos[0, :, -4:], states.qvel[0, :, -4:], states.ctrl[0, :, -2:]
+
+
+def _before(planned: Plan, states: States) -> tuple[Array, Array]:
+    """Return motor angles and rates before each step; the run starts at rest."""
+    q, v, _ = _joints(states)
+    q = np.concatenate([planned.motion.q[:1], q[:-1]])
+    return q[:, MOTORS], np.concatenate([np.zeros((1, 4)), v[:-1]])[:, MOTORS]
+
+
+def _drive(planned: Plan) -> Drive:
+    return getattr(planned.scenario.controller, "drive", "position")
+
+
+def _torque(planned: Plan, states: States) -> Array:
+    """Return the torque that each motor gave in each step [N m], (N, 2)."""
+    scenario, (q_next, v_next, ctrl) = planned.scenario, _joints(states)
+    return applied_torque(
+        scenario.servo,
+        scenario.sim.integrator,
+        ctrl,
+        *_before(planned, states),
+        q_next[:, MOTORS],
+        v_next[:, MOTORS],
+        _drive(planned),
+    )
+
+
+def saturated(planned: Plan, states: States) -> Bools:
+    """Return whether the torque limit clipped each motor in each step, (N, 2)."""
+    ctrl = _joints(states)[2]
+    return clipped(planned.scenario.servo, ctrl, *_before(planned, states), _drive(planned))
+
+
+def _surroundings(planned: Plan, states: States) -> Record:
+    """Return the columns of what the leg hangs on and stands on."""
+    scene, steps = planned.scenario.scene, states.time.shape[1]
+    record: Record = {}
+    if isinstance(scene, Ground):
+        record |= {"hip_z": states.qpos[0, :, 0], "hip_dot_z": states.qvel[0, :, 0]}
+        record |= {"ground_x": states.ground[0, :, 0], "ground_z": states.ground[0, :, 1]}
+    if isinstance(scene, Treadmill):
+        record["belt_x"] = -(scene.speed or 0.0) * planned.motion.time[1 : steps + 1]
+    return record
+
+
+def broken(planned: Plan, states: States, error: DivergedError) -> DivergedError:
+    """Return the error of a run that broke down: when the foot left its path, and what then."""
+    with np.errstate(all="ignore"):  # angles that overflow are no place near the path
+        left = left_path(planned.scenario.leg, columns(planned, states), error.time)
+    name = planned.scenario.name
+    return DivergedError(f"{name}: the foot left its path at t = {left:g} s; {error}", left)

@@ -1,0 +1,179 @@
+"""Reading a scenario's tables: each of them as what it stands for; errors name file and key."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from fivebar_sim import control, forces, geometry, paths, scenes, tables
+from fivebar_sim.checks import check_number
+from fivebar_sim.control import Feedback, Setpoints
+from fivebar_sim.errors import ArgumentError, ConfigError, unknown
+from fivebar_sim.forces import FootForce
+from fivebar_sim.geometry import FiveBar
+from fivebar_sim.paths import FootPath
+from fivebar_sim.scenes import Scene
+from fivebar_sim.servo import Servo
+from fivebar_sim.servo import read_table as read_servo
+from fivebar_sim.tables import Table
+
+NAME = re.compile(r"""(?![. ])[^/\\:*?"<>|]+(?<! )""")
+LONGEST_NAME = 200
+"""A file may have 255 bytes on most systems, and the run directory's stage adds some."""
+
+
+SHORT = {"leg": "preset", "servo": "preset", "scene": "kind"}
+"""Tables that may be a string instead, and the key that it stands for."""
+
+KINDS_OF = {"path": paths.KINDS, "scene": scenes.KINDS, "force": forces.KINDS}
+"""Tables whose `kind` says what their other keys are."""
+
+
+def change(table: Table, parts: list[str], value: Any, where: str) -> None:
+    """Apply one change to a scenario's table.
+
+    Another kind, or another controller.name, keeps only those keys that the new one has too.
+
+    Raises:
+        ConfigError: A part of the key is a value, not a table.
+    """
+    top = parts[0]
+    if isinstance(table.get(top), str) and top in SHORT and len(parts) > 1:
+        table[top] = {SHORT[top]: table[top]}
+    if top == "limits" and len(parts) > 1:
+        if isinstance(table.get("limits"), dict):
+            table["limits"] = dict(tables.flat(table["limits"]))
+        parts = ["limits", ".".join(parts[1:])]
+    tables.put(table, parts, value, where)
+    if not isinstance(value, str):
+        return
+    if top in KINDS_OF and parts == [top, "kind"] and value in KINDS_OF[top]:
+        known = tables.keys(KINDS_OF[top][value])
+        table[top] = {k: v for k, v in table[top].items() if k in known}
+    if parts == ["controller", "name"] and value in control.known():
+        known = ["name", *tables.keys(control.find(value))]
+        table["controller"] = {k: v for k, v in table["controller"].items() if k in known}
+
+
+def name_and_duration(table: Table, where: str) -> tuple[str, float]:
+    """Return the scenario's name, fit for a directory, and its duration [s]."""
+    name = table.get("name")
+    if not isinstance(name, str) or not _is_file_name(name):
+        raise ConfigError(
+            f"{where}: name must be a plain file name of 1 to {LONGEST_NAME} bytes, got {name!r}"
+        )
+    duration = table.get("duration", 4.0)
+    try:
+        check_number("duration", duration, "s", low=0.0, strict=True)
+    except ArgumentError as error:
+        raise ConfigError(f"{where}: {error}") from None
+    return name, float(duration)
+
+
+def _is_file_name(name: str) -> bool:
+    """Return whether a name may be that of a run directory, on any system."""
+    plain = NAME.fullmatch(name) is not None and name.isprintable()
+    return plain and len(name.encode()) <= LONGEST_NAME
+
+
+def leg(value: Any, where: str, folder: Path) -> FiveBar:
+    """Return the leg of "classic", of a file beside the scenario, or of a table with changes."""
+    base, own = _preset("leg", geometry.read_table, FiveBar.from_table, value, where, folder)
+    return FiveBar.from_table({**base, **own}, f"{where}: [leg]")
+
+
+def servo(value: Any, where: str, folder: Path) -> Servo:
+    """Return the servo of "xl330", of a file beside the scenario, or of a table with changes."""
+
+    def check(table: Table, source: str) -> Servo:
+        return tables.convert(table, Servo, "servo", source)
+
+    base, own = _preset("servo", read_servo, check, value, where, folder)
+    return tables.convert({**base, **own}, Servo, "servo", where)
+
+
+def _table(name: str, value: Any, where: str) -> Table:
+    """Return a copy of a table, or the one that a string stands for."""
+    if isinstance(value, str):
+        value = {SHORT[name]: value}
+    if not isinstance(value, dict):
+        raise ConfigError(
+            f"{where}: {name} must be the name of a {SHORT[name]} or a table, got {value!r}"
+        )
+    return dict(value)
+
+
+def _preset(
+    name: str,
+    read: Callable[[str | Path], Table],
+    check: Callable[[Table, str], object],
+    value: Any,
+    where: str,
+    folder: Path,
+) -> tuple[Table, Table]:
+    """Return the table of a preset that ships, or of a file beside the scenario, and the changes.
+
+    The preset is legal by itself; its errors say that it is one.
+    """
+    own = _table(name, value, where)
+    preset = own.pop("preset", None)
+    if preset is None:
+        return {}, own
+    if not isinstance(preset, str) or "\0" in preset:
+        raise ConfigError(f"{where}: {name}.preset must be a preset's name, got {preset!r}")
+    source = folder / preset if preset.endswith(".toml") else preset
+    try:
+        table = read(source)
+        tables.check_finite(table, str(source))
+        check(table, str(source))
+    except ConfigError as error:
+        raise ConfigError(f"{where}: {name}.preset: {error}") from None
+    return table, own
+
+
+def _kind(name: str, value: Any, where: str) -> type[Any]:
+    """Return the class that a table's `kind` names."""
+    known = KINDS_OF[name]
+    if not isinstance(value, dict) or "kind" not in value:
+        raise ConfigError(f"{where}: [{name}] needs a kind; known: {', '.join(sorted(known))}")
+    kind = value["kind"]
+    if not isinstance(kind, str) or kind not in known:
+        raise ConfigError(f"{where}: {name}.kind: {unknown(name, str(kind), known)}")
+    return known[kind]
+
+
+def path(value: Any, where: str, folder: Path) -> FootPath:
+    """Return the foot's path, its file read."""
+    kind = _kind("path", value, where)
+    return tables.convert(value, kind, "path", where).resolve(folder)
+
+
+def force(value: Any, where: str, folder: Path) -> FootForce | None:
+    """Return the foot's force profile, its file read; None where there is none."""
+    if value is None:
+        return None
+    kind = _kind("force", value, where)
+    return tables.convert(value, kind, "force", where).resolve(folder)
+
+
+def scene(value: Any, where: str) -> Scene:
+    """Return the scene of "rail", or of a table."""
+    if isinstance(value, str) and value not in scenes.KINDS:
+        raise ConfigError(f"{where}: {unknown('scene', value, scenes.KINDS)}")
+    own = _table("scene", value, where)
+    return tables.convert(own, _kind("scene", own, where), "scene", where)
+
+
+def controller(value: Any, where: str) -> tuple[str, Setpoints | Feedback]:
+    """Return the controller's name and the controller."""
+    if not isinstance(value, dict):
+        raise ConfigError(f"{where}: controller must be a table, got {value!r}")
+    own = dict(value)
+    name = own.pop("name", "servo")
+    try:
+        kind = control.find(str(name))
+    except ConfigError as error:
+        raise ConfigError(f"{where}: controller.name: {error}") from None
+    return str(name), tables.convert(own, kind, "controller", where)

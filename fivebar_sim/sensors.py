@@ -1,0 +1,31 @@
+"""The sensors of A and E: what a feedback controller gets to see."""
+
+from __future__ import annotations
+
+import msgspec
+
+from fivebar_sim.checks import check_number
+
+
+class Sensors(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """Angle and rate of each motor, late, noisy and in steps: the defaults are exact.
+
+        seen = round((theta(t - delay) + noise n) / resolution) resolution,   n ~ N(0, 1)
+
+    Attributes:
+        delay: Age of what is seen [s]; rounded to whole timesteps.
+        noise: Standard deviation of the angles [rad], white from one control step to the next.
+        rate_noise: Standard deviation of the rates [rad/s].
+        resolution: Step of the angles, as 2 pi / 4096 [rad]; 0 is none. Rates have none.
+    """
+
+    delay: float = 0.0
+    noise: float = 0.0
+    rate_noise: float = 0.0
+    resolution: float = 0.0
+
+    def __post_init__(self) -> None:
+        check_number("delay", self.delay, "s", low=0.0, high=10.0)
+        check_number("noise", self.noise, "rad", low=0.0, high=10.0)
+        check_number("rate_noise", self.rate_noise, "rad/s", low=0.0, high=1e6)
+        check_number("resolution", self.resolution, "rad", low=0.0, high=1.0)
