@@ -54,20 +54,28 @@ DETAILS = ("load.work", "load.opposing", "load.peak_ratio", "load.rms_ratio", "l
 """Metrics that are shown only where they have a limit, or where motors saturate."""
 
 
+SMALLER = {"mm": "um", "um": "nm"}
+"""The unit a thousand times smaller, for values that would have two zeros behind the point."""
+
+
 def shown(key: str, value: float | None) -> str:
     """Return a metric's value in the unit that people read."""
     _, scale, unit = SHOWN[key]
     if value is None:
         return "undefined"
-    return f"{scale * value:.4g} {unit}".strip()
+    number = scale * value
+    while 0.0 < abs(number) < 0.01 and unit in SMALLER:
+        number, unit = 1e3 * number, SMALLER[unit]
+    return f"{number:.4g} {unit}".strip()
 
 
 def bounds(limit: Limit) -> str:
     """Return a limit in the unit that people read: "<= 1.3 mm", "40 to 60 %"."""
     if limit.low == -math.inf:
         return f"<= {shown(limit.key, limit.high)}"
-    scale = SHOWN[limit.key][1]
-    return f"{scale * limit.low:.4g} to {shown(limit.key, limit.high)}"
+    low, high = (shown(limit.key, bound) for bound in (limit.low, limit.high))
+    unit = high.partition(" ")[2]
+    return f"{low.removesuffix(unit).strip()} to {high}"
 
 
 def verdict(ok: bool) -> str:
@@ -103,19 +111,20 @@ def _matters(key: str, result: Result) -> bool:
 
 
 def print_check(results: Sequence[Result], console: Console) -> None:
-    """Print the limits of many runs as one table."""
-    title = "foot tracking and load against their limits"
-    table = _table(title, ("scenario", "metric", "limit", "now", "verdict"))
+    """Print the limits of many runs as one table, the name of each run above its limits."""
+    table = _table(
+        "foot tracking and load against their limits", ("metric", "limit", "now", "verdict")
+    )
     for result in results:
-        name = escape(result.scenario.name)
+        table.add_row(f"[bold]{escape(result.scenario.name)}[/bold]")
         for limit in result.limits:
             label, now = SHOWN[limit.key][0], shown(limit.key, limit.value)
-            table.add_row(name, label, bounds(limit), now, verdict(limit.ok))
+            table.add_row(f"  {label}", bounds(limit), now, verdict(limit.ok))
         flips = result.metrics["branch"]["flips"]
         if flips:
-            table.add_row(name, "branch flips", "none", str(flips), verdict(False))
+            table.add_row("  branch flips", "none", str(flips), verdict(False))
         if not result.limits and not flips:
-            table.add_row(name, "no limits set", "", "", verdict(True))
+            table.add_row("  no limits set", "", "", verdict(True))
     console.print(table)
 
 

@@ -17,7 +17,7 @@ import numpy as np
 from fivebar_sim import kinematics, loop, resources
 from fivebar_sim.arrays import Array
 from fivebar_sim.errors import ArgumentError, GeometryError, unknown
-from fivebar_sim.geometry import FiveBar, Link, combined
+from fivebar_sim.geometry import LONGEST, FiveBar, Link, combined
 from fivebar_sim.kinematics.stops import stops_at_C
 from fivebar_sim.scenes import Ground, Payload, Scene, Treadmill, named
 from fivebar_sim.servo import Drive, Integrator, Servo
@@ -139,7 +139,11 @@ def _load(spec: mujoco.MjSpec, leg: FiveBar, scene: Payload) -> None:
 def _stand(spec: mujoco.MjSpec, leg: FiveBar, scene: Ground, q: Array) -> None:
     """Put the hip on the rail with its trunk, and in the keyframes the foot on the floor."""
     spec.body("hip").pos = (0.0, 0.0, 0.0)
-    spec.joint("hip_z").ref = 0.0
+    hip_z = spec.joint("hip_z")
+    hip_z.ref = 0.0
+    if scene.stop is not None:
+        hip_z.range = (scene.stop, LONGEST)
+        hip_z.limited = mujoco.mjtLimited.mjLIMITED_TRUE
     trunk = spec.body("trunk")
     trunk.mass = scene.mass
     trunk.ipos = (0.0, 0.0, 0.0)

@@ -99,7 +99,7 @@ def plan(scenario: Scenario) -> Plan:
     holding.check(scenario, wanted)
     start, pushes = wanted.q[0], np.empty((scenario.steps, 0))
     if isinstance(scene, Ground):
-        start = np.array([model.standing(scenario.leg, start) + scene.drop, *start])
+        start = _above_ground(scenario, scene, start)
     if isinstance(scene, Payload):
         pushes = wanted.force[:-1]
     controller = scenario.controller
@@ -117,6 +117,21 @@ def plan(scenario: Scenario) -> Plan:
     if asked:
         feedback.period_steps(planned)
     return planned
+
+
+def _above_ground(scenario: Scenario, scene: Ground, q: Array) -> Array:
+    """Return qpos of a leg whose foot is at the scene's height over the floor, (5,).
+
+    Raises:
+        ConfigError: The rail ends above that.
+    """
+    height = model.standing(scenario.leg, q) + scene.drop
+    if scene.stop is not None and not scene.stop <= height:
+        raise ConfigError(
+            f"scene.stop must be in [0, {height:g}] m, the hip's height at the start, "
+            f"got {scene.stop:g}"
+        )
+    return np.array([height, *q])
 
 
 def _setpoints(scenario: Scenario, controller: Setpoints, wanted: Motion) -> Array:

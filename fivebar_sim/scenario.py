@@ -182,7 +182,7 @@ class Scenario(msgspec.Struct, frozen=True, kw_only=True):
                 part["file"] = name
         table = {
             "name": self.name,
-            "scene": "air" if self.scene == Air() else msgspec.to_builtins(self.scene),
+            "scene": "air" if self.scene == Air() else _present(msgspec.to_builtins(self.scene)),
             "duration": self.duration,
             "leg": _present(asdict(self.leg)),
             "path": _present(path),

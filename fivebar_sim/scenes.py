@@ -50,16 +50,21 @@ class Ground(Scene, frozen=True):
         mass: Of the trunk that rides on the hip [kg].
         drop: Height of the foot above the floor at the start [m]; 0 starts standing.
         friction: Coulomb's coefficient between foot and floor; 0 is as good as frictionless.
+        stop: Lowest height of the hip above the floor [m]: there the rail ends, and the trunk sits
+            while the foot swings, as on the other legs. None: it falls as far as the leg lets it.
     """
 
     mass: float = 0.5
     drop: float = 0.0
     friction: float = 1.0
+    stop: float | None = None
 
     def __post_init__(self) -> None:
         check_number("mass", self.mass, "kg", low=0.0, high=HEAVIEST, strict=True)
         check_number("drop", self.drop, "m", low=0.0, high=LONGEST)
         check_number("friction", self.friction, "", low=0.0, high=100.0)
+        if self.stop is not None:
+            check_number("stop", self.stop, "m", low=0.0, high=LONGEST)
 
 
 class Rail(Ground, frozen=True, tag="rail"):
