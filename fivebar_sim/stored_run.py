@@ -1,0 +1,102 @@
+"""A run read back from its directory, for whoever shows it: replay, report, render."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from fivebar_sim import run_directory
+from fivebar_sim.errors import FiveBarError, RunDirectoryError
+from fivebar_sim.metrics import JOINT_COLUMNS, Record
+from fivebar_sim.scenario import Scenario
+
+COLUMNS = (
+    *("time", "target_x", "target_z", "foot_x", "foot_z"),
+    *JOINT_COLUMNS,
+    *(name.replace("theta", "theta_dot") for name in JOINT_COLUMNS),
+    *("ctrl_A", "ctrl_E", "torque_A", "torque_E", "gap"),
+)
+"""What every record has; scenes with a ground have more."""
+
+
+class StoredRun(NamedTuple):
+    """What a run directory holds.
+
+    Attributes:
+        path: The directory.
+        scenario: What was run.
+        record: The columns of rollout.parquet, each (N,), SI.
+        metrics: What metrics.json says.
+    """
+
+    path: Path
+    scenario: Scenario
+    record: Record
+    metrics: dict[str, Any]
+
+
+def read(path: Path) -> StoredRun:
+    """Return the run of a directory.
+
+    Raises:
+        RunDirectoryError: It is no complete run directory, or a file of it is damaged or foreign;
+            names the file.
+    """
+    run_directory.check_run(path)
+    try:
+        scenario = Scenario.load(path / "scenario.toml")
+    except FiveBarError as error:
+        raise RunDirectoryError(f"{path} is no run that can be read: {error}") from None
+    record = _record(path / "rollout.parquet")
+    rows = len(record["time"])
+    if rows != scenario.steps:
+        raise RunDirectoryError(
+            f"{path / 'rollout.parquet'}: a run of {scenario.duration:g} s at "
+            f"{scenario.sim.timestep:g} s has {scenario.steps} rows, got {rows}"
+        )
+    return StoredRun(path, scenario, record, _metrics(path / "metrics.json"))
+
+
+def _record(file: Path) -> Record:
+    """Return the columns of a record."""
+    import pyarrow
+    import pyarrow.parquet
+
+    try:
+        with file.open("rb") as stream:  # given a name, pyarrow would expand ~ and read it as a URI
+            table = pyarrow.parquet.read_table(stream)
+    except OSError as error:
+        raise RunDirectoryError(f"cannot read {file}: {error.strerror or error}") from None
+    except pyarrow.ArrowException as error:
+        said = " ".join(str(error).split())
+        raise RunDirectoryError(f"{file} is no record, or a damaged one: {said}") from None
+    missing = [name for name in COLUMNS if name not in table.column_names]
+    if missing:
+        raise RunDirectoryError(f"{file} is no record: it lacks the column {missing[0]}")
+    record: Record = {}
+    for name in table.column_names:
+        column = table[name]
+        if not pyarrow.types.is_float64(column.type) or column.null_count or not len(column):
+            raise RunDirectoryError(
+                f"{file} is no record: column {name} must be numbers, all there"
+            )
+        record[name] = column.to_numpy()
+        if not np.isfinite(record[name]).all():
+            raise RunDirectoryError(f"{file} is no record: column {name} is not finite")
+    return record
+
+
+def _metrics(file: Path) -> dict[str, Any]:
+    """Return what metrics.json says."""
+    try:
+        metrics = json.loads(file.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise RunDirectoryError(f"cannot read {file}: {error.strerror or error}") from None
+    except ValueError as error:
+        raise RunDirectoryError(f"{file} is not JSON: {error}") from None
+    if not isinstance(metrics, dict) or metrics.get("verdict") not in ("pass", "fail"):
+        raise RunDirectoryError(f"{file} has no verdict: it must be 'pass' or 'fail'")
+    return metrics

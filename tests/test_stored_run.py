@@ -1,0 +1,91 @@
+"""Runs read back: what was written comes back, and what is damaged is named."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pyarrow
+import pyarrow.parquet
+import pytest
+
+from fivebar_sim import rollout, stored_run
+from fivebar_sim.errors import RunDirectoryError
+from fivebar_sim.rollout import Result
+from fivebar_sim.scenario import Scenario
+
+
+@pytest.fixture(scope="module")
+def result() -> Result:
+    return rollout.run(Scenario.load("rail-landing", ["duration=0.8"]))
+
+
+@pytest.fixture(scope="module")
+def written(result: Result, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return result.write(tmp_path_factory.mktemp("runs") / "landing")
+
+
+def test_what_was_written_comes_back(result: Result, written: Path) -> None:
+    run = stored_run.read(written)
+    assert run.scenario.table() == result.scenario.table()
+    assert run.metrics == json.loads(json.dumps(result.metrics))
+    assert list(run.record) == list(result.record)
+    assert {"hip_z", "ground_z"} <= set(run.record)
+    for name, column in result.record.items():
+        np.testing.assert_array_equal(run.record[name], column, err_msg=name)
+
+
+def _truncated(run: Path) -> None:
+    file = run / "rollout.parquet"
+    file.write_bytes(file.read_bytes()[:-100])
+
+
+def _foreign(run: Path) -> None:
+    table = pyarrow.table({"time": [1.0]})
+    pyarrow.parquet.write_table(table, run / "rollout.parquet")
+
+
+def _changed(run: Path, column: str, value: object) -> None:
+    file = run / "rollout.parquet"
+    table = pyarrow.parquet.read_table(file).to_pydict()
+    table[column][3] = value
+    pyarrow.parquet.write_table(pyarrow.table(table), file)
+
+
+def _shortened(run: Path) -> None:
+    file = run / "rollout.parquet"
+    pyarrow.parquet.write_table(pyarrow.parquet.read_table(file).slice(0, 700), file)
+
+
+@pytest.mark.parametrize(
+    ("damage", "said"),
+    [
+        (_truncated, "rollout.parquet is no record, or a damaged one: "),
+        (_foreign, "rollout.parquet is no record: it lacks the column target_x"),
+        (lambda run: _changed(run, "gap", None), "column gap must be numbers, all there"),
+        (lambda run: _changed(run, "gap", float("nan")), "column gap is not finite"),
+        (_shortened, "a run of 0.8 s at 0.001 s has 800 rows, got 700"),
+        (lambda run: (run / "rollout.parquet").write_bytes(b""), "is no record, or a damaged one"),
+        (lambda run: (run / "metrics.json").write_text("{"), "metrics.json is not JSON: "),
+        (lambda run: (run / "metrics.json").write_text("{}"), "metrics.json has no verdict"),
+        (lambda run: (run / "metrics.json").unlink(), "is no run directory: it lacks metrics.json"),
+        (lambda run: (run / "scenario.toml").write_text("x = 1"), "is no run that can be read: "),
+        (shutil.rmtree, "is no run directory: no such directory"),
+    ],
+)
+def test_damage_is_named(
+    written: Path, tmp_path: Path, damage: Callable[[Path], object], said: str
+) -> None:
+    run = tmp_path / "run"
+    shutil.copytree(written, run)
+    stored_run.read(run)
+    damage(run)
+    with pytest.raises(RunDirectoryError) as caught:
+        stored_run.read(run)
+    message = str(caught.value)
+    assert said in message
+    assert str(run) in message
+    assert "\n" not in message
