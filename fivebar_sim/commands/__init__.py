@@ -1,0 +1,1 @@
+"""The commands of `fivebar`, one a file: call, print, return the exit status."""

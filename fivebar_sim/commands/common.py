@@ -1,0 +1,59 @@
+"""What the commands share: their arguments' types, exit statuses, and how they speak."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING, Annotated
+
+from tyro.conf import Positional, UseAppendAction, arg
+
+from fivebar_sim.errors import ConfigError, FiveBarError
+
+if TYPE_CHECKING:
+    from fivebar_sim.rollout import Plan
+
+Scenarios = Positional[Annotated[tuple[str, ...], arg(metavar="[SCENARIO ...]")]]
+Settings = UseAppendAction[Annotated[tuple[str, ...], arg(name="set", metavar="KEY=VALUE")]]
+
+FAILED, WRONG, INTERRUPTED, UNREAD = 1, 2, 130, 141
+
+
+def plans_of(scenarios: Iterable[str], settings: Sequence[str]) -> list[Plan]:
+    """Return the plans of all scenarios: everything is validated before the first one runs."""
+    from fivebar_sim import resources, rollout
+    from fivebar_sim.scenario import Scenario
+
+    chosen = list(scenarios) or list(resources.shipped("scenarios"))
+    loaded = [(source, Scenario.load(source, settings)) for source in chosen]
+    plans = []
+    for source, scenario in loaded:
+        try:
+            plans.append(rollout.plan(scenario))
+        except FiveBarError as error:
+            raise ConfigError(f"{source}: {error}") from None
+    return plans
+
+
+def screen():
+    """Return a console for stdout; a reader that has gone raises BrokenPipeError."""
+    from rich.console import Console
+
+    class Screen(Console):
+        def on_broken_pipe(self) -> None:  # rich itself would exit with 1, as if a limit failed
+            raise BrokenPipeError
+
+    return Screen()
+
+
+def working(what: str, *, quiet: bool):
+    """Return a context that shows a spinner on a terminal's stderr."""
+    from rich.console import Console
+    from rich.text import Text
+
+    return Console(stderr=True, quiet=quiet).status(Text(what))
+
+
+def say(error: BaseException | str) -> None:
+    """Print one line to stderr."""
+    print(f"fivebar: {' '.join(str(error).split())}", file=sys.stderr)  # noqa: T201

@@ -1,0 +1,87 @@
+"""`fivebar run`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from tyro.conf import arg
+
+from fivebar_sim.commands.common import FAILED, Scenarios, Settings, plans_of, say, screen, working
+from fivebar_sim.errors import ConfigError, DivergedError
+
+if TYPE_CHECKING:
+    from fivebar_sim.rollout import Plan
+
+
+def run(
+    scenarios: Scenarios = (),
+    /,
+    *,
+    out: Annotated[str | None, arg(metavar="DIR")] = None,
+    settings: Settings = (),
+    quiet: bool = False,
+    json: bool = False,
+) -> int:
+    """Simulate scenarios, judge them by their limits, write their run directories.
+
+    Args:
+        scenarios: Names of shipped scenarios or paths of TOML files; none: all that ship.
+        out: Run directory of one scenario, or the folder of several (default runs/NAME).
+        settings: Change one key of every scenario, as leg.L2=0.07 or "path.radii=[0.02, 0.01]";
+            repeats. Another path.kind keeps the keys that both kinds have.
+        quiet: Print nothing but errors.
+        json: Print the metrics as JSON instead of tables.
+    """
+    from fivebar_sim import run_directory
+
+    plans = plans_of(scenarios, settings)
+    places = _places(plans, out)
+    for place in places:
+        run_directory.check_place(place)
+    return _run(plans, places, quiet=quiet, as_json=json)
+
+
+def _run(plans: list[Plan], places: list[Path], *, quiet: bool, as_json: bool) -> int:
+    """Run the plans one after the other; return the highest status."""
+    import json
+
+    from fivebar_sim import console, rollout
+
+    status, metrics = 0, {}
+    out = screen()
+    for planned, place in zip(plans, places, strict=True):
+        name = planned.scenario.name
+        try:
+            with working(f"simulating {name}", quiet=quiet):
+                result = rollout.execute(planned)
+                result.write(place)
+        except DivergedError as error:
+            say(error)
+            status = FAILED
+            continue
+        metrics[name] = result.metrics
+        status = max(status, 0 if result.verdict == "pass" else FAILED)
+        if not (quiet or as_json):
+            console.print_result(result, str(place), out)
+    if as_json:
+        shown = next(iter(metrics.values()), None) if len(plans) == 1 else metrics
+        print(json.dumps(shown, indent=2, allow_nan=False))  # noqa: T201
+    return status
+
+
+def _places(plans: list[Plan], out: str | None) -> list[Path]:
+    """Return the run directory of every plan.
+
+    Raises:
+        ConfigError: --out is empty, or two scenarios of one name would write to one place.
+    """
+    if out == "":
+        raise ConfigError("--out must name a directory, got ''")
+    names = [planned.scenario.name for planned in plans]
+    if out is not None and len(plans) == 1:
+        return [Path(out)]
+    twice = sorted({name for name in names if names.count(name) > 1})
+    if twice:
+        raise ConfigError(f"two scenarios are called {twice[0]!r} and would write to one place")
+    return [Path(out or "runs") / name for name in names]
