@@ -77,8 +77,14 @@ print("slow:", sorted(slow & set(sys.modules)))
     assert done.stdout.endswith("slow: []\n")
 
 
-@pytest.mark.skipif(os.name == "nt", reason="Windows sends no SIGINT to one process")
-def test_interrupt_exits_130_and_leaves_nothing(folder: Path) -> None:
+@pytest.mark.skipif(os.name == "nt", reason="Windows sends no signals to one process")
+@pytest.mark.parametrize(
+    ("sent", "status", "said"),
+    [(signal.SIGINT, 130, b"fivebar: interrupted\n"), (signal.SIGTERM, 143, b"")],
+)
+def test_signal_ends_the_program_and_leaves_nothing(
+    folder: Path, sent: signal.Signals, status: int, said: bytes
+) -> None:
     code = "from fivebar_sim.cli import main; print(1, flush=True); raise SystemExit(main())"
     before = names(folder)
     long = ["run", "short.toml", "--set", "duration=1000", "--quiet"]
@@ -88,8 +94,8 @@ def test_interrupt_exits_130_and_leaves_nothing(folder: Path) -> None:
         assert process.stdout is not None
         process.stdout.readline()
         time.sleep(1.0)  # a run of this length takes more than five times that
-        process.send_signal(signal.SIGINT)
+        process.send_signal(sent)
         assert process.stderr is not None
-        assert process.stderr.read() == b"fivebar: interrupted\n"
-    assert process.returncode == 130
+        assert process.stderr.read() == said
+    assert process.returncode == status
     assert names(folder) == before

@@ -1,0 +1,83 @@
+"""Runs killed at any moment: what is left at their place is a whole run, or nothing."""
+
+from __future__ import annotations
+
+import os
+import random
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from fivebar_sim import run_directory, stored_run
+
+WRITER = Path(__file__).with_name("writer.py")
+pytestmark = pytest.mark.skipif(not hasattr(os, "fork"), reason="this system cannot fork")
+
+
+class Writer:
+    """The writing process, and the place where it writes."""
+
+    def __init__(self, place: Path) -> None:
+        self.place = place
+        command = [sys.executable, str(WRITER), str(place)]
+        self.process = subprocess.Popen(
+            command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, bufsize=1
+        )
+        self.takes = float(self._line())
+
+    def _line(self) -> str:
+        assert self.process.stdout is not None
+        return self.process.stdout.readline().strip()
+
+    def kill_after(self, seconds: float) -> None:
+        """Start to write, and kill what writes."""
+        assert self.process.stdin is not None
+        self.process.stdin.write("go\n")
+        child = int(self._line())
+        time.sleep(seconds)
+        os.kill(child, signal.SIGKILL)
+
+    def stop(self) -> None:
+        """End the process."""
+        self.process.communicate(timeout=30)
+
+
+@pytest.fixture
+def writer(tmp_path: Path) -> Iterator[Writer]:
+    started = Writer(tmp_path / "run")
+    yield started
+    started.stop()
+
+
+def check(writer: Writer) -> str:
+    """Return what is left, "nothing" or "run"; a run must be whole."""
+    if not writer.place.exists():
+        return "nothing"
+    run = stored_run.read(writer.place)
+    assert run.scenario.duration in (1.0, 1.2)
+    assert len(run.record["time"]) == run.scenario.steps
+    assert run_directory.is_run(writer.place)
+    assert (writer.place / "recording.rrd").read_bytes()[:4] == b"RRF2"
+    return "run"
+
+
+def killed(writer: Writer, times: int, seed: int) -> None:
+    rng, left = random.Random(seed), []
+    for _ in range(times):
+        writer.kill_after(rng.uniform(0.0, 3.0 * writer.takes))
+        left.append(check(writer))
+    assert "run" in left
+
+
+def test_killed_runs_are_whole_or_absent(writer: Writer) -> None:
+    killed(writer, 8, seed=1)
+
+
+@pytest.mark.long
+def test_two_hundred_killed_runs_are_whole_or_absent(writer: Writer) -> None:
+    killed(writer, 200, seed=2)
