@@ -10,7 +10,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from fivebar_sim.arrays import Array
-from fivebar_sim.checks import check_number
+from fivebar_sim.checks import LARGEST, check_number
 from fivebar_sim.control import Drive, Observation
 from fivebar_sim.errors import ArgumentError
 from fivebar_sim.sensors import Sensors
@@ -24,7 +24,7 @@ def whole_steps(name: str, seconds: float, timestep: float) -> int:
         ArgumentError: It is none, or less than one.
     """
     check_number(name, seconds, "s", low=0.0, strict=True)
-    steps = round(seconds / timestep)
+    steps = round(min(seconds / timestep, LARGEST))
     if steps < 1 or abs(steps * timestep - seconds) > 1e-6 * seconds:
         raise ArgumentError(
             f"{name} must be a whole number of timesteps of {timestep:g} s, got {seconds!r} s"
@@ -63,7 +63,7 @@ class ControlStep:
     ) -> None:
         self.every = every
         self._servo, self._sensors, self._drive, self._h = servo, sensors, drive, timestep
-        late = round(sensors.delay / timestep)
+        late = round(min(sensors.delay / timestep, steps))  # later, only the start would be seen
         self._theta = np.repeat(start[:, None], late + 1, axis=1)
         self._theta_dot = np.zeros_like(self._theta)
         self._noise = [np.random.default_rng(seed) for seed in seeds]

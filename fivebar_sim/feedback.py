@@ -13,7 +13,7 @@ from fivebar_sim.control_step import ControlStep, whole_steps
 from fivebar_sim.errors import ConfigError, DivergedError, FiveBarError, PoseError
 from fivebar_sim.motion import Motion
 from fivebar_sim.record import broken
-from fivebar_sim.simulate import States, is_broken, simulate_asking
+from fivebar_sim.simulate import States, check, is_broken, simulate_asking
 
 if TYPE_CHECKING:
     from fivebar_sim.rollout import Plan
@@ -37,39 +37,49 @@ def steer(plans: Sequence[Plan], nthread: int) -> States:
 
     Raises:
         ConfigError: A controller that fails, or commands what is no finite (nsim, 2).
-        DivergedError: A controller that cannot answer, as where the loop would not close.
+        DivergedError: A controller that cannot answer, as where the loop would not close, or a
+            simulation that broke down on the way; says which.
     """
     groups = _groups(plans)
     every, steps, h = groups[0].step.every, plans[0].scenario.steps, plans[0].motion.timestep
-    past: list[States] = []
 
-    def ask(k: int, states: States | None) -> Array | None:
-        if states is not None:
-            past.append(states)
-            if is_broken(states):
-                return None  # what broke, and when, is found out by who looks at the states
+    def ask(so_far: States) -> Array | None:
+        k = so_far.time.shape[1]
+        new = slice(max(k - every, 0), k)
+        if is_broken(so_far, new):
+            return None
         n = min(every, steps - k)
         ctrl = np.empty((len(plans), n, plans[0].model.nu))
         for row, plan in enumerate(plans):
             ctrl[row, :, :-2] = plan.pushes[k : k + n]
         for group in groups:
-            if states is not None:
-                theta = states.qpos[group.rows][..., MOTORS]
-                group.step.moved(theta, states.qvel[group.rows][..., MOTORS])
+            q, v = (field[group.rows, new][..., MOTORS] for field in (so_far.qpos, so_far.qvel))
+            group.step.moved(q, v)
             try:
                 command = _command(group, k)
             except PoseError as error:
                 row = group.rows[error.index[0] if error.index else 0]
                 why = f"controller {plans[row].scenario.controller_name!r} has no answer: {error}"
                 stopped = DivergedError(why, k * h)
-                if not past:
-                    raise stopped from error
-                raise broken(plans[row], States.joined(past).rows([row]), stopped) from error
+                raise broken(plans[row], so_far.rows([row]), stopped) from error
             ctrl[group.rows, :, -2:] = group.step.send(k, command)
         return ctrl
 
     start = np.stack([plan.start for plan in plans])
-    return simulate_asking([plan.model for plan in plans], start, steps, ask, nthread)
+    states = simulate_asking([plan.model for plan in plans], start, steps, ask, nthread)
+    if states.time.shape[1] < steps:  # the others' were ended with it
+        _raise_broken(plans, states)
+    return states
+
+
+def _raise_broken(plans: Sequence[Plan], states: States) -> None:
+    """Raise the error of the first plan whose simulation broke down."""
+    for row, plan in enumerate(plans):
+        own = states.rows([row])
+        try:
+            check(own, plan.motion.timestep)
+        except DivergedError as error:
+            raise broken(plan, own, error) from None
 
 
 def period_steps(plan: Plan) -> int:

@@ -24,22 +24,24 @@ def height(leg: FiveBar, record: Mapping[str, Array]) -> Array:
 def slid(leg: FiveBar, record: Mapping[str, Array]) -> Array:
     """Return how far the foot slid over the floor in each step but the first [m], (N - 1,).
 
-    The ball of radius r rolls with L2, whose direction is psi_2 = theta_A + theta_B; a belt that
-    moves by belt_x takes its point of contact along:
+    The ball rolls with L2, whose direction is psi_2 = theta_A + theta_B, and a belt that moves by
+    belt_x takes its point of contact along. Over a step, with r the ball's radius less half of what
+    it sinks in, which is where MuJoCo has that point:
 
-        foot_x + r psi_2 - belt_x, after the step less before it
+        d foot_x + r d psi_2 - d belt_x
     """
     psi_2 = record["theta_A"] + record["theta_B"]
     belt = record.get("belt_x", np.zeros_like(psi_2))
-    return np.diff(record["foot_x"] + leg.foot_radius * psi_2 - belt)
+    r = leg.foot_radius + 0.5 * np.minimum(height(leg, record), 0.0)
+    return np.diff(record["foot_x"] - belt) + 0.5 * (r[1:] + r[:-1]) * np.diff(psi_2)
 
 
 def measure(leg: FiveBar, record: Mapping[str, Array], window: slice) -> dict[str, Any]:
     """Return the metrics of the ground.
 
-    force_max, foot_height_max and flight_max (the longest time between two stances) are of the
-    whole run, whose landing may be before the window; stance_share (of the time) and slip (the way
-    that the foot slid while it stood) are of the window.
+    force_max, foot_height_max and flight_max (the longest time without force, that of a drop
+    included) are of the whole run, whose landing may be before the window; stance_share (of the
+    time) and slip (the way that the foot slid while it stood) are of the window.
 
     Args:
         leg: The leg.

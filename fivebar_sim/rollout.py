@@ -183,10 +183,11 @@ def run_all(plans: Sequence[Plan], nthread: int = 1) -> list[Result]:
     """
     results: dict[int, Result] = {}
 
-    def alike(index: int) -> tuple[float, int, str, int]:
-        planned = plans[index]
+    def alike(index: int) -> tuple[float, int, str, int, int]:
+        planned, scenario = plans[index], plans[index].scenario
         asked = 0 if planned.setpoints is not None else feedback.period_steps(planned)
-        return planned.motion.timestep, planned.scenario.steps, planned.scenario.scene.kind, asked
+        structure = scenario.scene.kind, planned.model.ngeom  # a leg with L6 has a geom more
+        return planned.motion.timestep, scenario.steps, *structure, asked
 
     for key, group in groupby(sorted(range(len(plans)), key=alike), key=alike):
         members = list(group)

@@ -14,7 +14,7 @@ from fivebar_sim import forces, paths, resources, scenario_table, tables
 from fivebar_sim.arrays import Array
 from fivebar_sim.checks import check_number
 from fivebar_sim.control import Feedback, Setpoints
-from fivebar_sim.errors import ConfigError, unknown
+from fivebar_sim.errors import ArgumentError, ConfigError, unknown
 from fivebar_sim.forces import FootForce
 from fivebar_sim.geometry import FiveBar
 from fivebar_sim.metrics import GROUND_KEYS, LIMIT_KEYS
@@ -244,6 +244,10 @@ def _check_window(scenario: Scenario, where: str) -> None:
     force = scenario.force
     if force is not None and not scenario.steps * h <= force.end * (1.0 + 1e-9):
         raise ConfigError(f"{where}: duration must be at most the force's {force.end:g} s, {came}")
+    try:
+        scenario.servo.latched(1, h)
+    except ArgumentError as error:
+        raise ConfigError(f"{where}: servo.{error}") from None
     needs, what = path.ramp, f"the ramp of {path.ramp:g} s"
     if path.period is not None:
         needs, what = needs + path.period, f"{what} and one period of {path.period:g} s"
@@ -266,7 +270,10 @@ def _belted(scene: Scene, path: FootPath, where: str) -> Scene:
             f"{where}: scene.speed is missing: only a gait path says by itself how fast the belt "
             f"must run"
         )
-    return msgspec.structs.replace(scene, speed=path.stance_speed)
+    try:
+        return msgspec.structs.replace(scene, speed=path.stance_speed)
+    except ArgumentError as error:
+        raise ConfigError(f"{where}: scene.{error} from the path's stance") from None
 
 
 def _check_scene(scenario: Scenario, where: str) -> None:
@@ -278,6 +285,8 @@ def _check_scene(scenario: Scenario, where: str) -> None:
             f"{where}: path.kind {kind!r} needs a ground: scene must be rail or treadmill, "
             f"got {scene.kind!r}"
         )
+    if isinstance(scene, Air) and scenario.force is not None:
+        raise ConfigError(f"{where}: [force] acts in no scene 'air': scene must be another one")
     if isinstance(scene, Payload) and scene.mass == 0.0 and scenario.force is None:
         raise ConfigError(
             f"{where}: scene.mass must be in (0, inf) kg where there is no [force], got 0.0"

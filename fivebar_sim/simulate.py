@@ -46,6 +46,10 @@ class States(NamedTuple):
         *fields, warnings = zip(*parts, strict=True)
         return cls(*(np.concatenate(field, axis=1) for field in fields), warnings=warnings[-1])
 
+    def first(self, steps: int) -> States:
+        """Return the first steps, as views."""
+        return States(*(field[:, :steps] for field in self[:-1]), warnings=self.warnings)
+
     def rows(self, which: slice | list[int]) -> States:
         """Return some of the simulations."""
         return States(*(field[which] for field in self))
@@ -113,6 +117,13 @@ class Legs:
             warnings=self._batch.warning[..., 1].sum(axis=1),  # (last info, count) of each kind
         )
 
+    def nothing(self, steps: int) -> States:
+        """Return room for the states of some steps, to be filled."""
+        (nq, nv, nu), nsim = self._sizes, self._batch.nsim
+        sizes = (nq, nv, nu, 0 if self._ground is None else 2)
+        fields = (np.empty((nsim, steps, size)) for size in sizes)
+        return States(np.empty((nsim, steps)), *fields, warnings=np.zeros(nsim, dtype=np.int64))
+
 
 def simulate(
     models: mujoco.MjModel | Sequence[mujoco.MjModel],
@@ -148,7 +159,7 @@ def simulate_asking(
     models: mujoco.MjModel | Sequence[mujoco.MjModel],
     qpos: Array,
     steps: int,
-    ask: Callable[[int, States | None], Array | None],
+    ask: Callable[[States], Array | None],
     nthread: int = 1,
 ) -> States:
     """Return the states of legs whose commands depend on how they move.
@@ -157,21 +168,25 @@ def simulate_asking(
         models: One model for all simulations, or one each (of one structure and timestep).
         qpos: Start poses, (nsim, nq).
         steps: N.
-        ask: Given k and the states since it was last asked (None at k = 0), returns the commands
-            of the steps from k on, (nsim, n, nu), n as it likes; None ends the run early.
+        ask: Given the states so far, none at first, returns the commands of the next n steps,
+            (nsim, n, nu), n as it likes; None ends the run early.
         nthread: Threads; 0 is one for every processor.
 
     Raises:
         ArgumentError: Shapes that do not fit, or commands that are not finite.
     """
-    legs, parts, k = Legs(models, qpos, nthread), [], 0
+    legs = Legs(models, qpos, nthread)
+    states, k = legs.nothing(steps), 0
     while k < steps:
-        ctrl = ask(k, parts[-1] if parts else None)
+        ctrl = ask(states.first(k))
         if ctrl is None:
             break
-        parts.append(legs.advance(ctrl[:, : steps - k]))
-        k += ctrl.shape[1]
-    return States.joined(parts)
+        part = legs.advance(ctrl[:, : steps - k])
+        n = part.time.shape[1]
+        for whole, piece in zip(states[:-1], part[:-1], strict=True):
+            whole[:, k : k + n] = piece
+        states, k = states._replace(warnings=part.warnings), k + n
+    return states.first(k)
 
 
 SPEED_LIMIT = 1e4
@@ -202,9 +217,10 @@ def check(states: States, timestep: float) -> None:
         )
 
 
-def is_broken(states: States) -> bool:
-    """Return whether a simulation broke down in these steps."""
-    return not (_moves(states).all() and not states.warnings.any())
+def is_broken(states: States, steps: slice) -> bool:
+    """Return whether a simulation broke down in some of the steps."""
+    part = States(*(field[:, steps] for field in states[:-1]), warnings=states.warnings)
+    return not (_moves(part).all() and not part.warnings.any())
 
 
 def _sound(states: States, timestep: float) -> Bools:
