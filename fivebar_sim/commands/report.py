@@ -1,0 +1,38 @@
+"""`fivebar report`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+from tyro.conf import Positional, arg
+
+from fivebar_sim.commands.common import working
+
+
+def report(
+    run_dirs: Positional[Annotated[tuple[Path, ...], arg(metavar="RUN_DIR [RUN_DIR ...]")]],
+    /,
+    *,
+    out: Annotated[Path | None, arg(metavar="HTML")] = None,
+    png: Annotated[Path | None, arg(metavar="DIR")] = None,
+    quiet: bool = False,
+) -> int:
+    """Explain a run, or compare several, on one HTML page that needs nothing else.
+
+    Args:
+        run_dirs: Run directories that `fivebar run` wrote; of several the differences are to the
+            first.
+        out: The page (default RUN_DIR/report.html, which the next run there deletes; of several
+            comparison.html).
+        png: A folder for the figures as single pictures.
+        quiet: Print nothing but errors.
+    """
+    from fivebar_sim import report as reports
+
+    with working("drawing", quiet=quiet):
+        *pictures, page = reports.write(run_dirs, out, png)
+    if not quiet:
+        more = f", {len(pictures)} figures in {png}" if pictures else ""
+        print(f"report of {len(run_dirs)} run{'s' * (len(run_dirs) > 1)} in {page}{more}")  # noqa: T201
+    return 0

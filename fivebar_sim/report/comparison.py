@@ -1,0 +1,253 @@
+"""The page of several runs: what differs in them, metric by metric, and their lines overlaid."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from fivebar_sim import ground, metrics, tables
+from fivebar_sim.arrays import Array
+from fivebar_sim.console import SHOWN, bounds, shown
+from fivebar_sim.metrics import look_up
+from fivebar_sim.recording_series import points
+from fivebar_sim.report import draw, html, numbers
+from fivebar_sim.report.draw import Drawn
+from fivebar_sim.report.html import Cell, plain, text
+from fivebar_sim.report.look import colour
+from fivebar_sim.stored_run import StoredRun
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+COLOURS, STYLES = 8, ("-", "--", ":", "-.")
+NAME = 0.19
+"""Height of a name above a figure [in]."""
+
+MOST = COLOURS * len(STYLES)
+"""How many runs can be told apart."""
+
+
+def names(runs: Sequence[StoredRun]) -> list[str]:
+    """Return what the runs are called: their directories' names, or paths where those are alike."""
+    short = [numbers.name_of(run) for run in runs]
+    return short if len(set(short)) == len(short) else [str(run.path) for run in runs]
+
+
+def figures(runs: Sequence[StoredRun]) -> list[Drawn]:
+    """Return the figures of runs overlaid; within `look.styled`."""
+    drawn = [_foot_paths(runs), *(_lines(runs, *each) for each in PLOTS)]
+    grounded = [run for run in runs if "ground_z" in run.record]
+    return drawn + ([_lines(runs, *GROUND)] if grounded else [])
+
+
+def page(runs: Sequence[StoredRun], drawn: list[Drawn]) -> str:
+    """Return the page that compares runs; within `look.styled`."""
+    called = names(runs)
+    said = f"{len(runs)} runs: {', '.join(called)}. Differences are to the first."
+    parts = [
+        f"<header>\n<h1>{text('Comparison of runs')}</h1>\n<p>{text(said)}</p>\n</header>",
+        html.section("Metrics", _metrics(runs)),
+        html.section("What differs in the scenarios", _differences(runs)),
+        html.section("What happened", html.figures(drawn)),
+    ]
+    return html.page(f"Comparison of {', '.join(called)}", parts)
+
+
+def _look(k: int, runs: Sequence[StoredRun]) -> dict[str, Any]:
+    """Return how run k is drawn: the first is the widest, so that those on top hide none."""
+    width = 2.6 - 1.6 * k / max(len(runs) - 1, 1)
+    return {"color": colour(f"run-{k % COLOURS + 1}"), "ls": STYLES[k // COLOURS], "lw": width}
+
+
+def _legend(figure: Figure, ax: Axes, called: Sequence[str]) -> None:
+    """Name the lines of an axes above the figure; given so, a name may begin with _."""
+    shorter = [name if len(name) <= 40 else f"{name[:18]} ... {name[-18:]}" for name in called]
+    lines = [line for line in ax.lines if line.get_gid() == "run"]
+    legend = figure.legend(lines, ["" for _ in lines], loc="outside upper center", ncols=1)
+    for entry, name in zip(legend.get_texts(), shorter, strict=True):
+        entry.set_text(name)
+
+
+def _foot_paths(runs: Sequence[StoredRun]) -> Drawn:
+    """Draw the foot paths of all runs over their targets."""
+    figure, ax = draw.plane(4.0 + NAME * len(runs))
+    for run in runs:
+        ax.plot(*(1e3 * points(run.record, "target")).T, color=colour("wash"), lw=4, alpha=0.35)
+    for k, run in enumerate(runs):
+        ax.plot(*(1e3 * points(run.record, "foot")).T, gid="run", **_look(k, runs))
+    _legend(figure, ax, names(runs))
+    return Drawn(
+        "foot-path",
+        "Foot paths",
+        "The foot's way in the hip frame; grey: the targets.",
+        f"The foot paths of {', '.join(names(runs))} in the leg plane, over their targets.",
+        figure,
+    )
+
+
+Column = Callable[[StoredRun], Array]
+
+
+def _lines(
+    runs: Sequence[StoredRun],
+    key: str,
+    title: str,
+    caption: str,
+    columns: dict[str, Column],
+    worst: bool,
+) -> Drawn:
+    """Draw columns of all runs over time.
+
+    Args:
+        runs: What to draw; a run without a column has no line.
+        key: Of the figure.
+        title: Of the figure.
+        caption: Of the figure.
+        columns: Name with unit to the values, a panel each.
+        worst: Whether only the largest value of each moment is drawn, on a scale by powers of ten.
+    """
+    figure, axes = draw.panels(
+        *[1.0] * len(columns), height=0.7 + 2.0 * len(columns) + NAME * len(runs)
+    )
+    for ax, (label, column) in zip(axes, columns.items(), strict=True):
+        ax.set_ylabel(label)
+        for k, run in enumerate(runs):
+            values = column(run)
+            rows = draw.highest(values) if worst else draw.envelope(values)
+            ax.plot(run.record["time"][rows], values[rows], gid="run", **_look(k, runs))
+        if worst:
+            _by_powers(ax, [float(column(run).max()) for run in runs])
+    axes[-1].set_xlim(0.0, max(float(run.record["time"][-1]) for run in runs))
+    _legend(figure, axes[0], names(runs))
+    alt = f"Lines over time of {', '.join(names(runs))}: {', '.join(columns)}."
+    return Drawn(key, title, caption, alt, figure)
+
+
+def _by_powers(ax: Axes, peaks: Sequence[float]) -> None:
+    """Scale an axis by powers of ten, down to a hundredth of the smallest peak that is not 0."""
+    from matplotlib.ticker import FuncFormatter, NullFormatter
+
+    above = [peak for peak in peaks if peak > 0.0]
+    if above:
+        ax.set_yscale("log")
+        ax.set_ylim(0.01 * min(above), 2.0 * max(above))
+        ax.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+        ax.yaxis.set_minor_formatter(NullFormatter())
+
+
+def _force(run: StoredRun) -> Array:
+    """Return the ground's force along z [N], NaN without a ground."""
+    return run.record.get("ground_z", np.full(len(run.record["time"]), np.nan))
+
+
+def _height(run: StoredRun) -> Array:
+    """Return the foot's height [mm], NaN without a ground."""
+    if "ground_z" not in run.record:
+        return np.full(len(run.record["time"]), np.nan)
+    return 1e3 * ground.height(run.scenario.leg, run.record)
+
+
+PLOTS: tuple[tuple[str, str, str, dict[str, Column], bool], ...] = (
+    (
+        "torque",
+        "Motor torques",
+        "What the motors at A and E applied.",
+        {
+            "torque A [mN m]": lambda run: 1e3 * run.record["torque_A"],
+            "torque E [mN m]": lambda run: 1e3 * run.record["torque_E"],
+        },
+        False,
+    ),
+    (
+        "tracking-error",
+        "Tracking error",
+        "How far the foot is from its target, the largest error of each moment.",
+        {"|foot - target| [mm]": lambda run: 1e3 * metrics.tracking_error(run.record)},
+        True,
+    ),
+    (
+        "loop-gap",
+        "Loop gap",
+        "How far the loop is open at C, the largest gap of each moment.",
+        {"gap at C [um]": lambda run: 1e6 * run.record["gap"]},
+        True,
+    ),
+    (
+        "load-share",
+        "Load share",
+        "A's part of the torque impulse; no line where neither motor has a torque.",
+        {"load share of A [%]": lambda run: 100.0 * numbers.share(run)},
+        False,
+    ),
+)
+
+GROUND = (
+    "ground",
+    "Ground",
+    "The ground's force on the foot, and the height of the foot's ball above the floor.",
+    {"force along z [N]": _force, "foot height [mm]": _height},
+    False,
+)
+
+
+def _metrics(runs: Sequence[StoredRun]) -> str:
+    """Return all metrics of all runs."""
+    head: list[object] = ["metric"]
+    for k, name in enumerate(names(runs)):
+        tint = f"var(--run-{k % COLOURS + 1})"
+        head.append(Cell(f'<span class="swatch" style="background: {tint}"></span>{text(name)}'))
+    rows: list[list[object]] = [
+        ["verdict", *(html.judged(run.metrics["verdict"] == "pass") for run in runs)]
+    ]
+    limits = [{limit.key: limit for limit in numbers.limits(run)} for run in runs]
+    for key, (label, _, _) in SHOWN.items():
+        if not any(key in numbers.keys(run) for run in runs):
+            continue
+        row: list[object] = [label]
+        for k, run in enumerate(runs):
+            if key not in numbers.keys(run):
+                row.append("")
+                continue
+            cell = str(text(shown(key, look_up(run.metrics, key))))
+            if k and key in numbers.keys(runs[0]):
+                cell += f"<small>{text(difference(key, run, runs[0]))}</small>"
+            if key in limits[k] and not limits[k][key].ok:
+                cell += f"<small>{html.judged(False, f', limit {bounds(limits[k][key])}')}</small>"
+            row.append(Cell(cell))
+        rows.append(row)
+    return html.table("Below each value: its difference to the first run.", head, rows)
+
+
+def difference(key: str, run: StoredRun, first: StoredRun) -> str:
+    """Return how a metric of a run differs from the first run's.
+
+    In percent of the first run's, or as a multiple from tenfold on; shares of a whole in points,
+    and where the first is 0, or one of them undefined, in words.
+    """
+    value, base = (look_up(each.metrics, key) for each in (run, first))
+    if value is None or base is None or value == base:
+        return "same" if value == base else "-"
+    if SHOWN[key][2] == "%":
+        return f"{100.0 * (value - base):+.3g} points"
+    if base == 0.0:
+        return "from 0"
+    if abs(value) >= 10.0 * abs(base):
+        return f"{value / base:.3g} times"
+    return f"{100.0 * (value - base) / abs(base):+.3g} %"
+
+
+def _differences(runs: Sequence[StoredRun]) -> str:
+    """Return the keys of the scenarios that are not the same in all runs."""
+    flat = [dict(tables.flat(run.scenario.table())) for run in runs]
+    keys = dict.fromkeys(key for each in flat for key in each)
+    rows = [
+        (key, *(plain(each[key]) if key in each else "-" for each in flat))
+        for key in keys
+        if any(key not in each or each[key] != flat[0].get(key) for each in flat)
+    ]
+    if not rows:
+        return "<p>Nothing: the scenarios are the same.</p>"
+    return html.table("Keys of scenario.toml, in SI units.", ("key", *names(runs)), rows)

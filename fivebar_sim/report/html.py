@@ -1,0 +1,150 @@
+"""A page's parts: everything that is text is escaped here, and nothing comes from elsewhere."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from html import escape
+
+from fivebar_sim import __version__
+from fivebar_sim.report import look
+from fivebar_sim.report.draw import Drawn
+
+POLICY = "default-src 'none'; style-src 'unsafe-inline'; img-src data:"
+"""What the browser may load: nothing."""
+
+STYLE = """
+* { box-sizing: border-box; }
+body { margin: 0 auto; padding: 1rem; max-width: 76rem; background: var(--paper); color: var(--ink);
+  font: 1rem/1.5 system-ui, sans-serif; }
+h1 { font-size: 1.6rem; line-height: 1.25; margin: .5rem 0; overflow-wrap: anywhere; }
+h2 { font-size: 1.2rem; margin: 2rem 0 .5rem; }
+h3 { font-size: 1rem; margin: 0 0 .25rem; }
+p { margin: .5rem 0; overflow-wrap: anywhere; }
+.verdict { display: inline-block; padding: .1rem .7rem; border: 2px solid; border-radius: .4rem;
+  font-weight: 700; }
+.pass { color: var(--gap); }
+.fail { color: var(--error); font-weight: 700; }
+.figures { display: grid; gap: 1.5rem;
+  grid-template-columns: repeat(auto-fit, minmax(min(100%, 27rem), 1fr)); }
+figure { margin: 0; min-width: 0; break-inside: avoid; }
+figure svg { display: block; width: 100%; max-width: 37rem; height: auto; }
+figcaption, .note { color: var(--muted); font-size: .9rem; max-width: 37rem; }
+.scroll { overflow-x: auto; max-width: 100%; }
+table { border-collapse: collapse; font-variant-numeric: tabular-nums; }
+caption { text-align: left; color: var(--muted); font-size: .9rem; padding-bottom: .25rem; }
+th, td { padding: .2rem .9rem .2rem 0; border-bottom: 1px solid var(--grid); text-align: left;
+  vertical-align: top; }
+th { font-weight: 600; }
+tbody th { font-weight: 400; }
+.number { text-align: right; white-space: nowrap; }
+td small { display: block; color: var(--muted); }
+pre, code { font: .85rem/1.45 ui-monospace, monospace; }
+pre { overflow-x: auto; padding: .75rem; border: 1px solid var(--grid); border-radius: .4rem; }
+.swatch { display: inline-block; width: 1.4em; height: .35em; margin-right: .4em;
+  vertical-align: middle; }
+footer { margin-top: 2rem; color: var(--muted); font-size: .9rem; }
+tbody th { min-width: 6.5rem; }
+@media (max-width: 40rem) {
+  table { font-size: .85rem; }
+  th, td { padding-right: .5rem; }
+}
+@media print {
+  body { max-width: none; padding: 0; font-size: 10pt; }
+  .figures { grid-template-columns: 1fr 1fr; }
+  .scroll { overflow: visible; }
+  pre { white-space: pre-wrap; overflow-wrap: anywhere; }
+}
+"""
+
+
+class Cell(str):
+    """HTML that is already escaped; any other text is escaped where it is put into a page."""
+
+
+def text(value: object) -> Cell:
+    """Return text as HTML, on one line; what is HTML already stays."""
+    return value if isinstance(value, Cell) else Cell(escape(" ".join(str(value).split())))
+
+
+def page(title: str, parts: Iterable[str]) -> str:
+    """Return a whole page.
+
+    Args:
+        title: Plain text.
+        parts: HTML of its body, one after the other.
+    """
+    light, dark = look.variables(False), look.variables(True)
+    head = f"""<!DOCTYPE html>
+<html lang="en">
+<head>
+<meta charset="utf-8">
+<meta name="viewport" content="width=device-width, initial-scale=1">
+<meta name="color-scheme" content="light dark">
+<meta http-equiv="Content-Security-Policy" content="{POLICY}">
+<title>{text(title)}</title>
+<style>
+:root {{ color-scheme: light dark; {light} }}
+@media screen and (prefers-color-scheme: dark) {{ :root {{ {dark} }} }}
+{STYLE.strip()}
+</style>
+</head>
+<body>
+"""
+    foot = f"<footer>Written by fivebar-sim {__version__}.</footer>\n</body>\n</html>\n"
+    return head + "\n".join(parts) + "\n" + foot
+
+
+def section(title: str, *parts: str) -> str:
+    """Return a section under a heading."""
+    return "\n".join([f"<section>\n<h2>{text(title)}</h2>", *parts, "</section>"])
+
+
+def figures(drawn: Sequence[Drawn]) -> str:
+    """Return figures side by side where there is room; within `look.styled`."""
+    parts = [
+        f'<figure id="{one.key}">\n<h3>{text(one.title)}</h3>\n'
+        f"{look.svg(one.figure, one.key, one.alt)}\n"
+        f"<figcaption>{text(one.caption)}</figcaption>\n</figure>"
+        for one in drawn
+    ]
+    return "\n".join(['<div class="figures">', *parts, "</div>"])
+
+
+def table(caption: str, head: Sequence[object], rows: Iterable[Sequence[object]]) -> str:
+    """Return a table; the first cell of a row is its heading, the others are values.
+
+    Where a table is wider than the page it scrolls by itself, also by keyboard.
+    """
+    top = "".join(f'<th scope="col"{_class(k)}>{text(cell)}</th>' for k, cell in enumerate(head))
+    body = "\n".join(
+        f'<tr><th scope="row">{text(row[0])}</th>'
+        + "".join(f"<td{_class(1)}>{text(cell)}</td>" for cell in row[1:])
+        + "</tr>"
+        for row in rows
+    )
+    return (
+        f'<div class="scroll" role="region" tabindex="0" aria-label="{text(caption)}">\n<table>\n'
+        f"<caption>{text(caption)}</caption>\n<thead><tr>{top}</tr></thead>\n"
+        f"<tbody>\n{body}\n</tbody>\n</table>\n</div>"
+    )
+
+
+def _class(column: int) -> str:
+    return ' class="number"' if column else ""
+
+
+def judged(ok: bool, more: str = "") -> Cell:
+    """Return "pass" or "FAIL", told apart by word and colour."""
+    word, kind = ("pass", "pass") if ok else ("FAIL", "fail")
+    return Cell(f'<span class="{kind}">{word}{escape(more)}</span>')
+
+
+def plain(value: object) -> str:
+    """Return a value as people write it: numbers to five digits, lists by commas."""
+    if isinstance(value, bool) or value is None:
+        return {True: "yes", False: "no", None: "none"}[value]
+    if isinstance(value, float):
+        return f"{value:.5g}"
+    if isinstance(value, (list, tuple)):
+        return ", ".join(plain(item) for item in value) or "none"
+    return str(value)

@@ -1,0 +1,151 @@
+"""The figures in the leg plane: the foot's path against its target, the leg over its workspace."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fivebar_sim import kinematics, workspace, workspace_map
+from fivebar_sim.arrays import Array
+from fivebar_sim.console import shown
+from fivebar_sim.metrics import JOINT_COLUMNS, look_up
+from fivebar_sim.recording_series import points
+from fivebar_sim.report import draw
+from fivebar_sim.report.draw import Drawn
+from fivebar_sim.report.look import colour
+from fivebar_sim.stored_run import StoredRun
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+PIECES = 24
+"""Colours along a path."""
+
+MOMENTS = 12
+"""How often the leg is drawn."""
+
+CELLS = 81
+"""Of the workspace's survey; a leg with L6 > 0 takes half a second for them, 5 s for the map's."""
+
+HARDLY = 0.05
+"""A foot that goes less than this part of the leg's size in a period hardly moves."""
+
+BANDS = 4
+"""Shades of the workspace, from its edge to its deepest place."""
+
+
+def foot_path(run: StoredRun) -> Drawn:
+    """Draw the foot's path, coloured by time, over its target."""
+    foot, target = (1e3 * points(run.record, name) for name in ("foot", "target"))
+    figure, ax = draw.plane(4.4)
+    ax.plot(*target.T, color=colour("muted"), lw=6.0, alpha=0.4, label="target")
+    ends = np.linspace(0, len(foot) - 1, PIECES + 1).astype(int)
+    for k, tint in enumerate(draw.time_colours(PIECES)):
+        width = 3.4 - 2.4 * k / PIECES  # so that a later round does not hide an earlier one
+        ax.plot(*foot[ends[k] : ends[k + 1] + 1].T, color=tint, lw=width)
+    ax.plot(*foot[0], "o", color=colour("ink"), ms=5, label="start")
+    ax.legend(loc="best")
+    _time_bar(figure, ax, run.record["time"])
+    rms = shown("tracking.rms", look_up(run.metrics, "tracking.rms"))
+    return Drawn(
+        "foot-path",
+        "Foot path",
+        f"The foot's way over its target in the hip frame, {rms} RMS apart; early and wide to "
+        "late and thin from blue to orange.",
+        f"The foot's path in the leg plane, coloured by time, over its target; {rms} RMS apart.",
+        figure,
+    )
+
+
+def _time_bar(figure: Figure, ax: Axes, time: Array) -> None:
+    """Draw which colour is which time, as a row of rectangles below the path."""
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.colors import BoundaryNorm, ListedColormap
+
+    edges = np.linspace(0.0, float(time[-1]), PIECES + 1)
+    tints = ListedColormap(draw.time_colours(PIECES))
+    bar = figure.colorbar(
+        ScalarMappable(BoundaryNorm(edges, PIECES), tints),
+        ax=ax,
+        orientation="horizontal",
+        label="time [s]",
+        fraction=0.06,
+        aspect=40,
+        ticks=np.linspace(0.0, float(time[-1]), 5),
+        format="%.3g",
+    )
+    assert bar.solids is not None
+    bar.solids.set_rasterized(False)
+    bar.solids.set_edgecolor("face")
+    bar.outline.set_visible(False)
+
+
+def leg_moments(run: StoredRun) -> Drawn:
+    """Draw the leg at a dozen moments over its workspace."""
+    leg, rows = run.scenario.leg, moments(run)
+    figure, ax = draw.plane(4.9)
+    deepest = _workspace(ax, run)
+    q = np.stack([run.record[name][rows] for name in JOINT_COLUMNS], axis=-1)
+    p = kinematics.chain_points(leg, q)
+    A, E = kinematics.bases(leg)
+    for k in range(len(rows)):
+        last = k == len(rows) - 1
+        look: dict[str, Any] = {"alpha": 1.0 if last else 0.3, "lw": 2.6 if last else 1.3}
+        for name, chain in (
+            ("A", (A, p.B[k], p.C_left[k], p.F[k])),
+            ("E", (E, p.D[k], p.C_right[k])),
+        ):
+            ax.plot(*(1e3 * np.array(chain)).T, "o-", color=colour(name), ms=3, **look)
+    ax.plot(*(1e3 * points(run.record, "foot")).T, color=colour("error"), lw=1.0)
+    for letter, point in (("A", A), ("B", p.B[-1]), ("C", p.C_left[-1]), ("D", p.D[-1]), ("E", E)):
+        ax.annotate(letter, tuple(1e3 * point), (4, 4), textcoords="offset points", weight="bold")
+    times = run.record["time"][rows]
+    return Drawn(
+        "leg-moments",
+        "The leg over its workspace",
+        f"The leg at {len(rows)} moments from {times[0]:.4g} s to {times[-1]:.4g} s, evenly along "
+        f"the foot's way, the last one bold. Shaded: what the foot reaches in this working mode, "
+        f"a shade deeper every {1e3 * deepest / BANDS:.3g} mm from the edge; violet: B, C and D in "
+        "line.",
+        f"The leg {run.scenario.leg.name} in {len(rows)} poses along its foot path, over the "
+        "region that its foot reaches.",
+        figure,
+    )
+
+
+def _workspace(ax: Axes, run: StoredRun) -> float:
+    """Draw what the foot reaches and where it is singular; return the depth of its middle [m]."""
+    leg = run.scenario.leg
+    surveyed = workspace_map.survey(leg, CELLS)
+    deepest = float(surveyed.distance.max())
+    x, z = 1e3 * surveyed.x, 1e3 * surveyed.z
+    for level in np.arange(BANDS) * deepest / BANDS:
+        shade = {"levels": [level, np.inf], "colors": [colour("wash")], "alpha": 0.11}
+        ax.contourf(x, z, surveyed.distance, **shade)
+    for curves, name, width in (
+        (workspace.boundary(leg, mode=leg.mode), "muted", 1.0),
+        (workspace.singular_curves(leg, leg.mode), "singular", 1.3),
+    ):
+        for curve in curves:
+            ax.plot(*(1e3 * curve).T, color=colour(name), lw=width)
+    return deepest
+
+
+def moments(run: StoredRun) -> NDArray[np.int64]:
+    """Return the rows in which the leg is drawn: evenly along the foot's way, in order.
+
+    The way is that of the first measured period, or of the whole run where there is no period or
+    the foot hardly moves in it.
+    """
+    window, period = run.scenario.window, run.scenario.path.period
+    foot = points(run.record, "foot")
+    way = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(foot, axis=0).T))])
+    first, last = 0, len(foot) - 1
+    if period is not None:
+        stop = min(window.start + round(period / run.scenario.sim.timestep), last)
+        if way[stop] - way[window.start] > HARDLY * run.scenario.leg.size:
+            first, last = window.start, stop
+    return np.unique(np.searchsorted(way, np.linspace(way[first], way[last], MOMENTS)))

@@ -1,0 +1,122 @@
+"""What a page says in numbers beyond the metrics, and whether the metrics are all there."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from fivebar_sim import metrics, tables
+from fivebar_sim.arrays import Array
+from fivebar_sim.checks import is_finite
+from fivebar_sim.console import SHOWN
+from fivebar_sim.control import Feedback
+from fivebar_sim.errors import RunDirectoryError
+from fivebar_sim.metrics import GROUND_KEYS, Limit
+from fivebar_sim.recording_series import SHARE_WINDOW, load_share
+from fivebar_sim.stored_run import StoredRun
+
+PERCENTILE = 95.0
+"""Of the tracking error, beside its RMS."""
+
+
+def check(run: StoredRun) -> None:
+    """Raise unless the metrics of a run are those that its page shows.
+
+    Raises:
+        RunDirectoryError: A metric is missing or no number; names the file and the key.
+    """
+    file = run.path / "metrics.json"
+    for key in keys(run):
+        try:
+            value = metrics.look_up(run.metrics, key)
+        except (KeyError, TypeError):
+            raise RunDirectoryError(f"{file} lacks the metric {key}") from None
+        if value is not None and not is_finite(value):
+            raise RunDirectoryError(f"{file}: {key} must be a number, got {value!r}")
+    for key in ("branch", "provenance"):
+        if not isinstance(run.metrics.get(key), Mapping):
+            raise RunDirectoryError(f"{file} lacks the table {key}")
+    numbers = [run.metrics["branch"].get("first_flip"), *_phase(run, file)]
+    bad = [value for value in numbers if value is not None and not is_finite(value)]
+    if bad:
+        raise RunDirectoryError(f"{file}: first_flip and phase must be numbers, got {bad[0]!r}")
+
+
+def _phase(run: StoredRun, file: Path) -> list[Any]:
+    """Return all that is said of the load over the cycle.
+
+    Raises:
+        RunDirectoryError: It is not one list of share_A and of either torque_rms, of one length.
+    """
+    phase = run.metrics["load"].get("phase")
+    if phase is None:
+        return []
+    try:
+        lists = [phase["share_A"], phase["torque_rms"]["A"], phase["torque_rms"]["E"]]
+        share, A, E = (list(each) for each in lists)
+    except (KeyError, TypeError):
+        raise RunDirectoryError(f"{file}: load.phase is not share_A and torque_rms") from None
+    if not len(share) == len(A) == len(E):
+        raise RunDirectoryError(f"{file}: the lists of load.phase must be of one length")
+    return [*share, *A, *E]
+
+
+def name_of(run: StoredRun) -> str:
+    """Return the name of a run's directory, in letters that can be written anywhere."""
+    name = os.path.basename(os.path.realpath(run.path))  # Path.resolve raises on a loop of links
+    return "".join(letter if letter.isprintable() else "?" for letter in name)
+
+
+def keys(run: StoredRun) -> list[str]:
+    """Return the metrics that a run of its scene has, in the order in which people read them."""
+    grounded = "ground_z" in run.record
+    return [key for key in SHOWN if grounded or key not in GROUND_KEYS]
+
+
+def limits(run: StoredRun) -> list[Limit]:
+    """Return every limit of the scenario with its value."""
+    return metrics.judge(run.metrics, run.scenario.limits)
+
+
+def percentile(run: StoredRun) -> float:
+    """Return the tracking error that 95 % of the measured steps stay below [m]."""
+    error = metrics.tracking_error(run.record)[run.scenario.window]
+    return float(np.percentile(error, PERCENTILE))
+
+
+def share(run: StoredRun) -> Array:
+    """Return A's share of the load in a moving window, NaN where there is no load, (N,)."""
+    torque = np.stack([run.record["torque_A"], run.record["torque_E"]], axis=-1)
+    half = round(0.5 * SHARE_WINDOW / run.scenario.sim.timestep)
+    values, loaded = load_share(torque, half)
+    drawn = np.full(len(loaded), np.nan)
+    drawn[loaded] = values
+    return drawn
+
+
+def torque_band(run: StoredRun, motor: str) -> tuple[Array, Array] | None:
+    """Return the least and the largest torque that a motor can have at its rate [N m], (N,) each.
+
+    With the servo's limit and what it loses with the rate v (see `servo.Servo`):
+
+        -limit - c v,   limit - c v
+
+    MuJoCo decides at the start of a step what the limit clips, so a step may end a little beyond.
+    None is for a servo without a limit.
+    """
+    servo, controller = run.scenario.servo, run.scenario.controller
+    if servo.limit is None:
+        return None
+    drive = controller.drive if isinstance(controller, Feedback) else "position"
+    lost = servo.passive(drive) * run.record[f"theta_dot_{motor}"]
+    return -servo.limit - lost, servo.limit - lost
+
+
+def flat_metrics(run: StoredRun) -> dict[str, Any]:
+    """Return every metric by its dotted key, without verdict, limits and provenance."""
+    apart = ("verdict", "limits", "provenance")
+    return dict(tables.flat({key: value for key, value in run.metrics.items() if key not in apart}))

@@ -1,0 +1,167 @@
+"""The page of one run: verdict, limits, figures, all metrics, what was run and how to again."""
+
+from __future__ import annotations
+
+import shlex
+
+import tomli_w
+
+from fivebar_sim import tables
+from fivebar_sim.checks import is_finite
+from fivebar_sim.console import SHOWN, bounds, shown
+from fivebar_sim.metrics import look_up
+from fivebar_sim.report import html, in_plane, numbers, over_time
+from fivebar_sim.report.draw import Drawn
+from fivebar_sim.report.html import plain, text
+from fivebar_sim.stored_run import StoredRun
+
+
+def figures(run: StoredRun) -> list[Drawn]:
+    """Return the figures of a run; within `look.styled`."""
+    drawn = [
+        in_plane.foot_path(run),  # side by side on a desk: two of a height
+        in_plane.leg_moments(run),
+        over_time.tracking_error(run),
+        over_time.load_share(run),
+        over_time.torque(run),
+        over_time.ground_contact(run),
+        over_time.loop_gap(run),
+    ]
+    return [one for one in drawn if one is not None]
+
+
+def page(run: StoredRun, drawn: list[Drawn]) -> str:
+    """Return the page of a run with its figures; within `look.styled`."""
+    scenario = run.scenario
+    parts = [
+        _head(run),
+        html.section("Limits", _limits(run)),
+        html.section("What happened", html.figures(drawn)),
+        html.section("How the motors shared the load", _load(run), *_phase(run)),
+        html.section("All metrics", _metrics(run)),
+        html.section("What was run", *_what(run)),
+    ]
+    return html.page(f"{scenario.name}: {run.metrics['verdict']}", parts)
+
+
+def _head(run: StoredRun) -> str:
+    """Return name, verdict and a sentence about the run."""
+    scenario, metrics = run.scenario, run.metrics
+    window, h = scenario.window, scenario.sim.timestep
+    good = metrics["verdict"] == "pass"
+    about = (
+        f"The leg {scenario.leg.name} follows a path of kind {scenario.path.__struct_config__.tag} "
+        f"in the scene {scenario.scene.kind}, driven by the controller "
+        f"{scenario.controller_name}, for {scenario.duration:g} s in steps of {1e3 * h:g} ms. "
+        f"Tracking and load are measured from {window.start * h:.4g} s to {window.stop * h:.4g} s, "
+        f"the loop gap over the whole run."
+    )
+    flip = metrics["branch"].get("first_flip")
+    left = (
+        [] if flip is None else [f'<p class="fail">The leg left its branch at t = {flip:g} s.</p>']
+    )
+    word = "pass" if good else "fail"
+    return "\n".join(
+        [
+            f"<header>\n<h1>{text(scenario.name)}</h1>",
+            f'<p><span class="verdict {word}">{"PASS" if good else "FAIL"}</span></p>',
+            *left,
+            f"<p>{text(about)}</p>\n</header>",
+        ]
+    )
+
+
+def _limits(run: StoredRun) -> str:
+    """Return every limit, the value, and whether it holds."""
+    rows = [
+        (SHOWN[limit.key][0], bounds(limit), shown(limit.key, limit.value), html.judged(limit.ok))
+        for limit in numbers.limits(run)
+    ]
+    flips = run.metrics["branch"]["flips"]
+    rows.append(("branch flips", "none", str(flips), html.judged(flips == 0)))
+    return html.table(
+        "The run passes if all of these hold.", ("metric", "limit", "value", ""), rows
+    )
+
+
+def _load(run: StoredRun) -> str:
+    """Return what either motor did, and how they worked against each other."""
+    named = {
+        "load.torque_rms": "torque RMS",
+        "load.torque_peak": "torque peak",
+        "load.work.{}.positive": "work given",
+        "load.work.{}.negative": "work taken",
+        "load.work.{}.net": "work net",
+        "load.saturated": "time saturated",
+    }
+    rows: list[tuple[str, str, str]] = []
+    for key, label in named.items():
+        pair = [key.format(m) if "{}" in key else f"{key}.{m}" for m in "AE"]
+        A, E = (shown(each, look_up(run.metrics, each)) for each in pair)
+        rows.append((label, A, E))
+    for key, label in (("load.share_A", "load share"), ("load.thermal_share_A", "thermal share")):
+        part = look_up(run.metrics, key)
+        rows.append((label, shown(key, part), shown(key, None if part is None else 1.0 - part)))
+    limit = run.scenario.servo.limit
+    if limit is not None:
+        peaks = [look_up(run.metrics, f"load.torque_peak.{motor}") or 0.0 for motor in "AE"]
+        A, E = (shown("load.share_A", peak / limit) for peak in peaks)
+        rows.append((f"peak, of the servo's {shown('load.torque_peak.A', limit)}", A, E))
+    fraction, energy = (
+        shown(key, look_up(run.metrics, key))
+        for key in ("load.opposing.fraction", "load.opposing.energy")
+    )
+    note = (
+        f"One motor drove while the other braked in {fraction} of the steps; {energy} went from "
+        "one to the other."
+    )
+    return html.table("Over the measured time.", ("", "A", "E"), rows) + f"\n<p>{text(note)}</p>"
+
+
+def _phase(run: StoredRun) -> list[str]:
+    """Return the load over the gait's cycle, if the path has one."""
+    phase = run.metrics["load"].get("phase")
+    if phase is None:
+        return []
+    share, rms = phase["share_A"], phase["torque_rms"]
+    rows = [
+        (
+            f"{100.0 * k / len(share):.4g} to {100.0 * (k + 1) / len(share):.4g} %",
+            shown("load.torque_rms.A", rms["A"][k]),
+            shown("load.torque_rms.E", rms["E"][k]),
+            shown("load.share_A", part),
+        )
+        for k, part in enumerate(share)
+    ]
+    head = ("of the cycle", "torque A RMS", "torque E RMS", "load share A")
+    return [html.table("Over the cycle of the path.", head, rows)]
+
+
+def _metrics(run: StoredRun) -> str:
+    """Return every metric, as people read it and as metrics.json has it."""
+    rows = []
+    for key, value in numbers.flat_metrics(run).items():
+        if key.startswith("load.phase."):
+            continue  # a table of its own
+        alike = key.replace("load.stance.", "load.")
+        label, read = key.rpartition(".")[2].replace("_", " "), plain(value)
+        if alike in SHOWN and (value is None or is_finite(value)):
+            label, read = SHOWN[alike][0], shown(alike, value)
+        label += ", in stance" if alike != key else ""
+        rows.append((label, read, plain(value), html.Cell(f"<code>{text(key)}</code>")))
+    return html.table(
+        "As in metrics.json, there in SI units.", ("metric", "value", "SI", "key"), rows
+    )
+
+
+def _what(run: StoredRun) -> list[str]:
+    """Return the resolved scenario, what the numbers depend on, and the command."""
+    again = shlex.join(["fivebar", "run", f"{numbers.name_of(run)}/scenario.toml"])
+    rows = [(key, plain(value)) for key, value in tables.flat(run.metrics["provenance"])]
+    return [
+        "<p>To run it again, from the folder that the run directory is in:</p>",
+        f"<pre><code>{html.escape(again)}</code></pre>",
+        html.table("Where the numbers come from.", ("", ""), rows),
+        "<p>The scenario with every default spelt out, scenario.toml:</p>",
+        f'<pre tabindex="0"><code>{html.escape(tomli_w.dumps(run.scenario.table()))}</code></pre>',
+    ]

@@ -1,0 +1,68 @@
+"""A report's page read back: its elements, attributes and text, without a browser."""
+
+from __future__ import annotations
+
+from html.parser import HTMLParser
+from pathlib import Path
+from typing import NamedTuple
+
+VOID = {"meta", "br", "link", "img", "input", "hr"}
+
+
+class Element(NamedTuple):
+    """One element."""
+
+    tag: str
+    attributes: dict[str, str]
+    text: list[str]
+
+
+class Page(HTMLParser):
+    """All elements of a page in order, each with the text within it; everything is closed."""
+
+    def __init__(self, path: Path) -> None:
+        super().__init__()
+        self.elements: list[Element] = []
+        self.open: list[Element] = []
+        self.source = path.read_text(encoding="utf-8")
+        self.feed(self.source)
+        self.close()
+        assert self.open == []
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        """Open an element."""
+        element = Element(tag, {key: value or "" for key, value in attrs}, [])
+        self.elements.append(element)
+        if tag not in VOID:
+            self.open.append(element)
+
+    def handle_startendtag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        """Keep an element that has nothing inside, as SVG has."""
+        self.elements.append(Element(tag, {key: value or "" for key, value in attrs}, []))
+
+    def handle_endtag(self, tag: str) -> None:
+        """Close the last element, which must be this one."""
+        assert self.open.pop().tag == tag
+
+    def handle_data(self, data: str) -> None:
+        """Give text to all that are open."""
+        for element in self.open:
+            element.text.append(data)
+
+    def all(self, tag: str) -> list[Element]:
+        """Return the elements of a tag."""
+        return [element for element in self.elements if element.tag == tag]
+
+    def ids(self, tag: str) -> list[str]:
+        """Return the ids of the elements of a tag."""
+        return [element.attributes.get("id", "") for element in self.all(tag)]
+
+    def rows(self) -> list[list[str]]:
+        """Return the cells of all rows of all tables."""
+        rows: list[list[str]] = []
+        for element in self.elements:
+            if element.tag == "tr":
+                rows.append([])
+            elif element.tag in ("td", "th"):
+                rows[-1].append(" ".join("".join(element.text).split()))
+        return rows

@@ -1,0 +1,271 @@
+"""The report of a run and the comparison of several: what is on the page, and what is refused."""
+
+from __future__ import annotations
+
+import json
+import re
+import shlex
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from reports import Page
+from shell import Shell
+
+from fivebar_sim import report, rollout, run_directory, stored_run, tables
+from fivebar_sim.console import SHOWN, bounds, shown
+from fivebar_sim.errors import ArgumentError, RunDirectoryError
+from fivebar_sim.metrics import judge, look_up
+from fivebar_sim.report import comparison
+from fivebar_sim.scenario import Scenario
+
+AIR = ["foot-path", "leg-moments", "tracking-error", "load-share", "torque", "loop-gap"]
+GROUNDED = [*AIR[:-1], "ground", "loop-gap"]
+OVERLAID = ["foot-path", "torque", "tracking-error", "loop-gap", "load-share", "ground"]
+APART, MISSING = ("verdict", "limits", "provenance"), object()
+EVIL = "<script>alert('1')</script> &amp; $x$"
+
+
+@pytest.fixture(scope="module")
+def runs(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    """Return run directories: in the air failing, of an odd name, and on the ground."""
+    folder = tmp_path_factory.mktemp("runs")
+    asked = {
+        "_odd $a$ & <b>": ("classic-ellipse", ["duration=0.8", "limits.tracking.rms=1e-9"]),
+        "limited": ("classic-ellipse", ["duration=0.8", "servo.limit=0.02"]),
+        "trot": ("treadmill-trot", ["duration=0.7"]),
+    }
+    for name, (scenario, settings) in asked.items():
+        loaded = Scenario.load(scenario, [*settings, f'leg.name="{EVIL}"'])
+        rollout.run(loaded).write(folder / name)
+    return {name: folder / name for name in asked}
+
+
+@pytest.fixture(scope="module")
+def pages(runs: dict[str, Path]) -> dict[str, Page]:
+    """Return the pages of all runs, and that of them together as "all"."""
+    pictures = {"trot": runs["trot"].parent / "pictures"}
+    places = {
+        name: report.write([path], None, pictures.get(name))[-1] for name, path in runs.items()
+    }
+    together = report.write(list(runs.values()), runs["trot"].parent / "all.html")[-1]
+    return {name: Page(place) for name, place in {**places, "all": together}.items()}
+
+
+def test_a_page_is_whole_and_says_its_verdict(
+    runs: dict[str, Path], pages: dict[str, Page]
+) -> None:
+    for name, path in runs.items():
+        run, page = stored_run.read(path), pages[name]
+        assert page.all("html")[0].attributes["lang"] == "en"
+        assert page.all("title")[0].text == [f"{run.scenario.name}: {run.metrics['verdict']}"]
+        (word,) = (e for e in page.all("span") if "verdict" in e.attributes.get("class", ""))
+        assert word.text == [run.metrics["verdict"].upper()]
+        assert page.ids("figure") == (GROUNDED if name == "trot" else AIR)
+    assert {pages[name].all("title")[0].text[0] for name in ("limited", "_odd $a$ & <b>")} == {
+        "classic-ellipse: fail"
+    }
+    assert "treadmill-trot: pass" in pages["trot"].all("title")[0].text
+
+
+def test_figures_have_alternatives_and_captions(pages: dict[str, Page]) -> None:
+    for page in pages.values():
+        drawn = len(page.ids("figure"))
+        assert len(page.all("svg")) == len(page.all("figcaption")) == drawn
+        for svg in page.all("svg"):
+            assert svg.attributes["role"] == "img"
+            assert len(svg.attributes["aria-label"]) > 30
+            assert len("".join(svg.text)) > 20  # ticks and labels are letters, not shapes
+
+
+def test_every_limit_is_there_with_value_and_verdict(
+    runs: dict[str, Path], pages: dict[str, Page]
+) -> None:
+    seen = set()
+    for name, path in runs.items():
+        run, rows = stored_run.read(path), pages[name].rows()
+        for limit in judge(run.metrics, run.scenario.limits):
+            word = "pass" if limit.ok else "FAIL"
+            seen.add(word)
+            row = [SHOWN[limit.key][0], bounds(limit), shown(limit.key, limit.value), word]
+            assert row in rows
+        assert ["branch flips", "none", "0", "pass"] in rows
+    assert seen == {"pass", "FAIL"}
+
+
+def test_every_metric_is_in_the_table(runs: dict[str, Path], pages: dict[str, Page]) -> None:
+    for name, path in runs.items():
+        metrics = json.loads((path / "metrics.json").read_text())
+        by_key = {row[3]: row for row in pages[name].rows() if len(row) == 4}
+        for key, _ in tables.flat({k: metrics[k] for k in metrics if k not in APART}):
+            if key in SHOWN:
+                value = shown(key, look_up(metrics, key))
+                assert by_key[key][:2] == [SHOWN[key][0], value]
+            elif not key.startswith("load.phase."):
+                assert key in by_key
+                assert by_key[key][0].strip(", ") != ""
+    rows = pages["trot"].rows()
+    assert len([row for row in rows if re.fullmatch(r"[\d.]+ to [\d.]+ %", row[0])]) == 8
+
+
+def test_what_was_run_can_be_run_again(runs: dict[str, Path], pages: dict[str, Page]) -> None:
+    for name, path in runs.items():
+        command, scenario = ("".join(pre.text) for pre in pages[name].all("pre"))
+        assert scenario == (path / "scenario.toml").read_text(encoding="utf-8")
+        assert shlex.split(command) == ["fivebar", "run", f"{name}/scenario.toml"]
+        provenance = stored_run.read(path).metrics["provenance"]
+        assert ["mujoco", provenance["mujoco"]] in pages[name].rows()
+
+
+def test_nothing_is_loaded_run_or_let_through(pages: dict[str, Page]) -> None:
+    for name, page in pages.items():
+        assert not page.all("script")
+        assert (EVIL in "".join(page.all("header")[0].text)) == (name != "all")
+        ids = [e.attributes["id"] for e in page.elements if "id" in e.attributes]
+        assert len(ids) == len(set(ids))
+        for element in page.elements:
+            for key, value in element.attributes.items():
+                assert not key.startswith("on")
+                assert "//" not in value
+                for target in re.findall(r"url\((.*?)\)", value):
+                    assert target.removeprefix("#") in ids
+            link = element.attributes.get("href", "#")
+            assert link == "#" or link.removeprefix("#") in ids
+        assert "default-src 'none'" in page.source
+        assert "@import" not in page.source
+
+
+def test_comparison_tells_runs_apart(runs: dict[str, Path], pages: dict[str, Page]) -> None:
+    page, rows = pages["all"], pages["all"].rows()
+    assert page.ids("figure") == OVERLAID
+    assert rows[0] == ["metric", *runs]
+    assert rows[1] == ["verdict", "FAIL", "FAIL", "pass"]
+    for svg in page.all("svg"):
+        assert set(runs) <= {text.strip() for text in svg.text}
+    read = [stored_run.read(path) for path in runs.values()]
+    for key, (label, _, _) in SHOWN.items():
+        (row,) = (row for row in rows if row[0] == label)
+        for cell, run in zip(row[1:], read, strict=True):
+            grounded = "ground" in run.metrics
+            if key.startswith("ground") and not grounded:
+                assert cell == ""
+            else:
+                assert cell.startswith(shown(key, look_up(run.metrics, key)))
+                if run is not read[0] and not key.startswith("ground"):
+                    assert comparison.difference(key, run, read[0]) in cell
+    differing = {row[0]: row[1:] for row in rows}
+    assert differing["servo.limit"] == ["-", "0.02", "-"]
+    assert differing["path.kind"] == ["ellipse", "ellipse", "gait"]
+    assert "path.ramp" in differing
+    assert "sim.timestep" not in differing
+
+
+def test_same_runs_same_bytes(
+    runs: dict[str, Path], pages: dict[str, Page], tmp_path: Path
+) -> None:
+    import matplotlib
+
+    with matplotlib.rc_context({"svg.hashsalt": None, "xtick.major.size": 20.0, "font.size": 20}):
+        *pictures, page = report.write([runs["trot"]], tmp_path / "again.html", tmp_path / "png")
+    assert page.read_text(encoding="utf-8") == pages["trot"].source
+    assert [path.name for path in pictures] == [f"{key}.png" for key in GROUNDED]
+    for picture in pictures:
+        assert picture.read_bytes().startswith(b"\x89PNG")
+        assert (
+            picture.read_bytes() == (runs["trot"].parent / "pictures" / picture.name).read_bytes()
+        )
+
+
+@pytest.mark.usefixtures("pages")
+def test_a_run_directory_with_its_report_stays_one(runs: dict[str, Path], tmp_path: Path) -> None:
+    run = shutil.copytree(runs["limited"], tmp_path / "run")
+    assert (run / "report.html").is_file()
+    assert run_directory.is_run(run)
+    run_directory.check_place(run)
+    rollout.run(stored_run.read(run).scenario).write(run)
+    assert not (run / "report.html").exists()
+
+
+def test_command_says_where(runs: dict[str, Path], shell: Shell) -> None:
+    run = shutil.copytree(runs["limited"], shell.folder / "mine")
+    assert shell("report", "mine") == (0, "report of 1 run in mine/report.html\n", "")
+    assert (run / "report.html").stat().st_mode & 0o777 == 0o644
+    (shell.folder / "old.html").write_text("someone's")
+    said = shell("report", "mine", str(runs["trot"]), "--png", "new/png", "--out", "old.html")
+    assert said == (0, "report of 2 runs in old.html, 6 figures in new/png\n", "")
+    assert (shell.folder / "old.html").read_text().startswith("<!DOCTYPE html>")
+    assert {path.name for path in (shell.folder / "new/png").iterdir()} == {
+        f"{key}.png" for key in OVERLAID
+    }
+    assert not [path for path in shell.folder.rglob("*") if path.suffix == ".partial"]
+    assert report.place_of([run, run]) == Path("comparison.html")
+
+
+def test_refusals_are_one_line(runs: dict[str, Path], shell: Shell) -> None:
+    shutil.copytree(runs["limited"], shell.folder / "mine")
+    (shell.folder / "d.html").mkdir()
+    (shell.folder / "file").write_text("x")
+    assert shell.refused("report", "no") == "no is no run directory: no such directory"
+    assert "a.txt: a report must end in .html" in shell.refused("report", "mine", "--out", "a.txt")
+    assert "a directory is there" in shell.refused("report", "mine", "--out", "d.html")
+    assert "cannot write file/a.html" in shell.refused("report", "mine", "--out", "file/a.html")
+    assert "cannot write file/foot-path.png" in shell.refused("report", "mine", "--png", "file")
+    assert shell.refused("report", "mine", "d.html/../mine").endswith("mine is given twice")
+    assert shell("report").status == 2
+
+
+def _with(key: str, value: object) -> Callable[[Path], object]:
+    """Return what sets a key of metrics.json; MISSING takes it away."""
+
+    def change(run: Path) -> None:
+        file = run / "metrics.json"
+        table = metrics = json.loads(file.read_text())
+        *parts, last = key.split(".")
+        for part in parts:
+            table = table[part]
+        table.pop(last)
+        if value is not MISSING:
+            table[last] = value
+        file.write_text(json.dumps(metrics))
+
+    return change
+
+
+@pytest.mark.parametrize(
+    ("damage", "said"),
+    [
+        (
+            lambda run: (run / "rollout.parquet").write_bytes(b"PAR1"),
+            "rollout.parquet is no record",
+        ),
+        (lambda run: (run / "metrics.json").unlink(), "it lacks metrics.json"),
+        (_with("load.torque_rms.E", MISSING), "metrics.json lacks the metric load.torque_rms.E"),
+        (_with("ground", MISSING), "metrics.json lacks the metric ground.force_max.x"),
+        (_with("provenance", MISSING), "metrics.json lacks the table provenance"),
+        (_with("tracking", 3), "metrics.json lacks the metric tracking.rms"),
+        (_with("closure.rms", "big"), "closure.rms must be a number, got 'big'"),
+        (_with("closure.rms", float("nan")), "closure.rms must be a number, got nan"),
+        (_with("branch.first_flip", "x"), "first_flip and phase must be numbers, got 'x'"),
+        (_with("load.phase.share_A", [0.5]), "the lists of load.phase must be of one length"),
+        (_with("load.phase", {"share_A": []}), "load.phase is not share_A and torque_rms"),
+    ],
+)
+def test_damage_is_refused(
+    runs: dict[str, Path], tmp_path: Path, damage: Callable[[Path], object], said: str
+) -> None:
+    run = shutil.copytree(runs["trot"], tmp_path / "run")
+    (run / "report.html").unlink(missing_ok=True)
+    damage(run)
+    with pytest.raises(RunDirectoryError) as caught:
+        report.write([run])
+    assert said in str(caught.value)
+    assert "\n" not in str(caught.value)
+    assert not (run / "report.html").exists()
+
+
+def test_too_many_or_no_runs() -> None:
+    with pytest.raises(ArgumentError, match="a report is of 1 to 32 runs, got 0"):
+        report.write([])
+    with pytest.raises(ArgumentError, match="got 33"):
+        report.write([Path(str(k)) for k in range(33)])

@@ -1,0 +1,128 @@
+"""A report in a browser: it loads nothing else, draws everything, and fits its window.
+
+Needs Chromium and Playwright's Python package; FIVEBAR_BROWSER=required makes their lack an error.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import pytest
+
+from fivebar_sim import report, rollout
+from fivebar_sim.scenario import Scenario
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Browser, Page
+
+WIDTHS = (390, 1280)
+
+FIGURES = """() => [...document.querySelectorAll('figure')].map(figure => {
+    const box = figure.querySelector('svg').getBoundingClientRect();
+    const all = tag => [...figure.querySelectorAll('svg ' + tag)];
+    const lines = all('path').filter(path => path.getTotalLength() > 50);
+    const letters = all('text').map(text => text.getBoundingClientRect());
+    return {
+        width: box.width, height: box.height, lines: lines.length, letters: letters.length,
+        outside: letters.filter(b => b.left < box.left - 3 || b.right > box.right + 3).length,
+        smallest: Math.min(...letters.filter(b => b.width >= b.height).map(b => b.height)),
+    };
+})"""
+
+SEEN = """selector => {
+    const style = getComputedStyle(document.querySelector(selector));
+    return [style.color, style.stroke, style.backgroundColor];
+}"""
+
+
+def missing() -> str | None:
+    """Return what the browser's tests lack, or None."""
+    if importlib.util.find_spec("playwright") is None:
+        return "Playwright's Python package is not installed"
+    if shutil.which("chromium") is None:
+        return "there is no chromium on the PATH"
+    return None
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Browser]:
+    lack = missing()
+    if lack is not None:
+        if os.environ.get("FIVEBAR_BROWSER") == "required":
+            pytest.fail(f"FIVEBAR_BROWSER is required, but {lack}")
+        pytest.skip(lack)
+    from playwright.sync_api import sync_playwright
+
+    with sync_playwright() as playwright:
+        flags = ["--no-sandbox", "--disable-gpu"]
+        started = playwright.chromium.launch(executable_path=shutil.which("chromium"), args=flags)
+        yield started
+        started.close()
+
+
+@pytest.fixture(scope="module")
+def reports(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    """Return the page of a run, and that of two, one with a name that is too long for a line."""
+    folder = tmp_path_factory.mktemp("runs")
+    runs = [folder / "trot", folder / ("a" * 60 + " " + "b" * 90)]
+    for place, name in zip(runs, ("treadmill-trot", "classic-ellipse"), strict=True):
+        rollout.run(Scenario.load(name, ["duration=0.8"])).write(place)
+    return {
+        "one": report.write(runs[:1])[-1],
+        "two": report.write(runs, folder / "two.html")[-1],
+    }
+
+
+def opened(
+    browser: Browser, path: Path, width: int, scheme: str = "light"
+) -> tuple[Page, list[str]]:
+    """Return a page, and a list that gathers what it says or asks for."""
+    dark = "dark" if scheme == "dark" else "light"
+    page = browser.new_page(viewport={"width": width, "height": 800}, color_scheme=dark)
+    said: list[str] = []
+    page.on("console", lambda message: said.append(message.text))
+    page.on("pageerror", lambda error: said.append(str(error)))
+    page.on("requestfailed", lambda request: said.append(request.url))
+    page.on("request", lambda request: said.append(request.url))
+    page.goto(path.as_uri(), wait_until="networkidle")
+    return page, said
+
+
+@pytest.mark.parametrize("width", WIDTHS)
+@pytest.mark.parametrize("which", ["one", "two"])
+def test_page_is_alone_drawn_and_fits(
+    browser: Browser, reports: dict[str, Path], which: str, width: int
+) -> None:
+    page, said = opened(browser, reports[which], width)
+    assert said == [reports[which].as_uri()]
+    assert page.evaluate("document.documentElement.scrollWidth") <= width
+    figures = page.evaluate(FIGURES)
+    assert len(figures) == (7 if which == "one" else 6)
+    for figure in figures:
+        assert 300.0 < figure["width"] <= width
+        assert figure["height"] > 120.0
+        assert figure["lines"] >= 2
+        assert figure["letters"] >= 6
+        assert figure["outside"] == 0
+        assert figure["smallest"] >= 8.0
+    page.close()
+
+
+def test_dark_and_light_and_print(browser: Browser, reports: dict[str, Path]) -> None:
+    """Paper, letters and a line differ between light and dark; paper is printed white."""
+    selectors = ("body", "#torque text", "#tracking-error path[style*='--error']")
+    looks = {}
+    for scheme in ("light", "dark"):
+        page, _ = opened(browser, reports["one"], 1280, scheme)
+        looks[scheme] = [page.evaluate(SEEN, each) for each in selectors]
+        page.emulate_media(media="print", color_scheme="dark" if scheme == "dark" else "light")
+        assert page.evaluate(SEEN, "body")[2] == "rgb(255, 255, 255)"
+        page.close()
+    for light, dark in zip(looks["light"], looks["dark"], strict=True):
+        assert light != dark
+    assert looks["dark"][0][2] == "rgb(21, 24, 29)"
