@@ -1,54 +1,67 @@
-"""The Rerun recording of a run, derived from its record: the moving leg, the series, the metrics.
+"""The Rerun recording of runs, derived from their records: moving legs, plots, limits.
 
 Rerun is slow to import: only the functions that use it do.
 """
 
 from __future__ import annotations
 
-import importlib.util
 import json
 import os
 import threading
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fivebar_sim import recording_foot as foot
+from fivebar_sim import recording_ground as ground
+from fivebar_sim import recording_layout as layout
 from fivebar_sim import recording_scene as scene
 from fivebar_sim.arrays import Array
 from fivebar_sim.errors import FiveBarError
-from fivebar_sim.geometry import FiveBar
-from fivebar_sim.recording_series import Series, points, series, summary, timestep
+from fivebar_sim.metrics import Record
+from fivebar_sim.recording_look import Look, looks
+from fivebar_sim.recording_motion import Motion, Rows, Stage, drawn_rows, motion, points, stage
+from fivebar_sim.recording_series import Series, series
+from fivebar_sim.recording_summary import summary
 
 if TYPE_CHECKING:
     import rerun as rr
-    import rerun.blueprint as rrb
 
-Rows = NDArray[np.intp]
+    from fivebar_sim.scenario import Scenario
 
 APPLICATION = "fivebar"
-SUMMARY = "summary"
 LOCK = threading.Lock()
-POSE_PERIOD = 0.01
-"""Time between two drawn poses [s]: 100 Hz looks like every step, at a fraction of the size."""
-
-
-class ViewerMissingError(FiveBarError, FileNotFoundError):
-    """The installed Rerun has no viewer binary."""
 
 
 class RerunDisabledError(FiveBarError, RuntimeError):
     """Rerun is switched off by the environment."""
 
 
-def write(
-    path: Path, leg: FiveBar, record: Mapping[str, Array], metrics: Mapping[str, Any], name: str
-) -> None:
-    """Write the recording of a run to a .rrd file, in one go.
+class Run(Protocol):
+    """What is drawn of a run: a result, or one that was read back."""
+
+    @property
+    def scenario(self) -> Scenario:
+        """What was run."""
+        ...
+
+    @property
+    def record(self) -> Record:
+        """The columns of rollout.parquet, each (N,), SI."""
+        ...
+
+    @property
+    def metrics(self) -> Mapping[str, Any]:
+        """What metrics.json says."""
+        ...
+
+
+def write(path: Path, runs: Sequence[Run], labels: Sequence[str] = ()) -> None:
+    """Write the recording of runs to a .rrd file, in one go; several lie over each other.
 
     Timelines: `sim_time` (the record's time, to the nanosecond) and `step` (from 1: t = step h).
     Series have every row of the record, poses one row every `POSE_PERIOD` and the last one. The
@@ -56,17 +69,17 @@ def write(
 
     Args:
         path: The file; an existing one is overwritten.
-        leg: The leg that moved.
-        record: Columns of a run (SI, hip frame), each (N,), N > 0.
-        metrics: What was measured; tables may nest.
-        name: Of the run, not empty; also the recording's id.
+        runs: What is drawn, at least one. Of several each has its own colour, and its entities
+            are under run_1, run_2, ...
+        labels: What each is called, all different; left out, what their scenarios are called.
 
     Raises:
         OSError: The file cannot be written.
         RerunDisabledError: The environment variable RERUN switches Rerun off.
     """
+    names = list(labels) or [run.scenario.name for run in runs]
     with _session():
-        data = _encoded(leg, record, metrics, name)
+        data = _encoded(runs, names)
     path.write_bytes(data)
 
 
@@ -90,43 +103,58 @@ def _session() -> Iterator[None]:
             rerun_bindings.flush_and_cleanup_orphaned_recordings()
 
 
-def _encoded(
-    leg: FiveBar, record: Mapping[str, Array], metrics: Mapping[str, Any], name: str
-) -> bytes:
+def _encoded(runs: Sequence[Run], names: list[str]) -> bytes:
     """Return the bytes of the recording."""
     import rerun as rr
 
-    time = record["time"]
-    every, drawn = np.arange(len(time)), drawn_rows(time)
-    foot, target = points(record, "foot"), points(record, "target")
-    q = np.stack([record[f"theta_{joint}"] for joint in "ABED"], axis=-1)
-    motion = scene.Motion(q[drawn], foot[drawn], target[drawn])
-    plots = list(series(record))
-    text = rr.TextDocument(summary(metrics, name), media_type="text/markdown")
+    shown = looks(names)
+    moved = [motion(run.record, drawn_rows(run.record["time"])) for run in runs]
+    plots = [list(series(run.scenario, run.record)) for run in runs]
+    room = stage([run.scenario.leg for run in runs], moved)
+    text = summary(names, [run.metrics for run in runs], [run.scenario.limits for run in runs])
 
+    name = " + ".join(names)
     stream = rr.RecordingStream(APPLICATION, recording_id=name, send_properties=False)
     if not stream.is_enabled():
         raise RerunDisabledError(
             f"Rerun is switched off: RERUN must be unset or 'on', got {os.environ.get('RERUN')!r}"
         )
     output = stream.binary_stream()
-    _send_properties(stream, leg, name)
-    _send_blueprint(stream, _contents(leg, motion, plots))
-    stream.log(SUMMARY, text, static=True)
-    scene.log_leg(stream, leg)
-    scene.log_path(stream, target)
-    scene.send_motion(stream, leg, motion, _times(time, drawn))
-    for plot in plots:
-        _send_series(stream, plot, _times(time, every))
+    stream.send_recording_name(name)
+    layout.send(stream, layout.contents(room, shown, plots))
+    stream.log("/", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
+    stream.log(layout.SUMMARY, rr.TextDocument(text, media_type="text/markdown"), static=True)
+    if room.floor:
+        ground.log_floor(stream, room)
+    for run, look, poses, lines in zip(runs, shown, moved, plots, strict=True):
+        _send_run(stream, run, look, poses, lines, room)
     data = output.read()
     assert data is not None
     return data
 
 
-def drawn_rows(time: Array) -> Rows:
-    """Return the rows whose poses are drawn: the first, one every `POSE_PERIOD`, and the last."""
-    every = max(1, round(POSE_PERIOD / timestep(time)))
-    return np.union1d(np.arange(0, len(time), every), len(time) - 1)
+def _send_run(
+    stream: rr.RecordingStream,
+    run: Run,
+    look: Look,
+    moved: Motion,
+    plots: list[Series],
+    room: Stage,
+) -> None:
+    """Send one run: its leg as a property and in motion, the foot, the ground, the plots."""
+    import rerun as rr
+
+    leg, time = run.scenario.leg, run.record["time"]
+    every, drawn = _times(time, np.arange(len(time))), _times(time, drawn_rows(time))
+    # as JSON, since a plain value keeps the type that it first had
+    stream.send_property(f"{look.root}leg", rr.AnyValues(json=json.dumps(asdict(leg))))
+    scene.log_leg(stream, leg, look)
+    scene.send_leg(stream, leg, moved, look, drawn)
+    foot.log_foot(stream, points(run.record, "target"), look)
+    foot.send_foot(stream, leg, moved, look, drawn)
+    ground.send_ground(stream, leg, moved, look, drawn, room)
+    for plot in plots:
+        _send_series(stream, plot, look, every)
 
 
 def _times(time: Array, rows: Rows) -> list[rr.TimeColumn]:
@@ -137,91 +165,17 @@ def _times(time: Array, rows: Rows) -> list[rr.TimeColumn]:
     return [rr.TimeColumn("sim_time", duration=stamps), rr.TimeColumn("step", sequence=rows + 1)]
 
 
-def _send_properties(stream: rr.RecordingStream, leg: FiveBar, name: str) -> None:
-    """Send the run's name, and the leg as JSON: a plain value keeps the type it first had."""
-    import rerun as rr
-
-    stream.send_recording_name(name)
-    stream.send_property("leg", rr.AnyValues(json=json.dumps(asdict(leg))))
-
-
-def _send_series(stream: rr.RecordingStream, plot: Series, times: list[rr.TimeColumn]) -> None:
+def _send_series(
+    stream: rr.RecordingStream, plot: Series, look: Look, times: list[rr.TimeColumn]
+) -> None:
     """Send all lines of a plot as one column; a row without values is an empty one, a gap."""
     import rerun as rr
 
-    look = rr.SeriesLines(names=list(plot.lines), colors=list(plot.lines.values()))
-    stream.log(plot.path, look, static=True)
+    style = rr.SeriesLines(
+        names=[look.line(name) for name in plot.lines],
+        colors=[look.colour(colour) for colour in plot.lines.values()],
+    )
+    stream.log(f"{look.root}{plot.path}", style, static=True)
     values = rr.Scalars.columns(scalars=plot.values.ravel())
-    stream.send_columns(plot.path, times, values.partition(len(plot.lines) * plot.shown))
-
-
-def _contents(leg: FiveBar, motion: scene.Motion, plots: list[Series]) -> rrb.Container:
-    """Return the views: leg and metrics on the left, the plots on the right."""
-    import rerun.blueprint as rrb
-
-    views = [_plot_view(plot) for plot in plots]
-    text = rrb.TextDocumentView(origin=SUMMARY, name="Metrics")
-    left = rrb.Vertical(scene.view(leg, motion), text, row_shares=[3, 2])
-    right = rrb.Vertical(*views[:-2], rrb.Tabs(*views[-2:]))
-    return rrb.Horizontal(left, right)
-
-
-def _send_blueprint(stream: rr.RecordingStream, contents: rrb.Container) -> None:
-    """Send the layout.
-
-    Rerun logs it to a stream of its own, which would live (with threads and megabytes) until the
-    process ends: it belongs to a sink that belongs to it. Disconnecting parts the two.
-    """
-    import rerun.blueprint as rrb
-
-    streams: list[rr.RecordingStream] = []
-
-    class Layout(rrb.Blueprint):
-        def _log_to_stream(self, stream: rr.RecordingStream) -> None:
-            streams.append(stream)
-            super()._log_to_stream(stream)
-
-    layout = Layout(
-        contents,
-        rrb.BlueprintPanel(state="collapsed"),
-        rrb.SelectionPanel(state="collapsed"),
-        rrb.TimePanel(state="collapsed", timeline="sim_time", loop_mode="all"),
-        auto_layout=False,
-        auto_views=False,
-    )
-    stream.send_blueprint(layout)
-    while streams:  # emptied, since a class lives until the next garbage collection
-        streams.pop().disconnect()
-
-
-def _plot_view(plot: Series) -> rrb.TimeSeriesView:
-    import rerun.blueprint as rrb
-
-    return rrb.TimeSeriesView(
-        origin=plot.path,
-        name=plot.title,
-        axis_x=rrb.TimeAxis(link="LinkToGlobal"),
-        axis_y=rrb.ScalarAxis(range=plot.bounds) if plot.bounds else None,
-    )
-
-
-def viewer_command(path: Path) -> list[str]:
-    """Return the command that opens a recording in a new native viewer, reachable from here only.
-
-    Rerun's viewer also serves, by default to the whole network; it binds the loopback only when
-    its command line says so. The `rerun` script on the PATH is a wrapper that outlives its viewer
-    or dies without it, so this is the binary itself.
-
-    Raises:
-        ViewerMissingError: The installation lacks the binary.
-    """
-    spec = importlib.util.find_spec("rerun_cli")
-    folders = [Path(folder) for folder in (spec and spec.submodule_search_locations) or []]
-    for folder in folders:
-        for binary in ("Rerun.app/Contents/MacOS/Rerun", "rerun", "rerun.exe"):
-            if (folder / binary).is_file():
-                loopback = ["--bind", "127.0.0.1", "--port", "auto"]
-                return [str(folder / binary), *loopback, str(path.resolve())]
-    raise ViewerMissingError(
-        f"the viewer's binary is missing from rerun-sdk: no 'rerun' in {folders or 'rerun_cli'}"
-    )
+    columns = values.partition(len(plot.lines) * plot.shown)
+    stream.send_columns(f"{look.root}{plot.path}", times, columns)

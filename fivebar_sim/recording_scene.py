@@ -1,4 +1,4 @@
-"""The leg of a recording in 3D: solid links that move, the target path, the foot's trail.
+"""The leg of a recording in 3D: solid links that move.
 
 The hip frame's (x, z) is drawn at y = 0 of a right-handed frame with z up, where an angle that
 turns +x to +z is a turn about -y. A link's own frame has its origin at the inner joint and x along
@@ -9,7 +9,7 @@ it, as they are built, so that links may pass each other; every frame stays in t
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -17,38 +17,27 @@ from numpy.typing import ArrayLike
 from fivebar_sim.arrays import Array
 from fivebar_sim.geometry import FiveBar
 from fivebar_sim.kinematics import bases, chain_points
+from fivebar_sim.recording_look import (
+    BLUE,
+    GREY,
+    LIGHT_BLUE,
+    LIGHT_ORANGE,
+    ORANGE,
+    PURPLE,
+    RED,
+    Colour,
+    Look,
+)
+from fivebar_sim.recording_motion import Motion, in_height
 
 if TYPE_CHECKING:
     import rerun as rr
-    import rerun.blueprint as rrb
 
-TRAIL_SECONDS = 0.5
-"""How long the trail of the foot stays [s]."""
 HIP = "hip"
-TARGET, TARGET_PATH, TRAIL = f"{HIP}/target", f"{HIP}/target_path", f"{HIP}/foot_trail"
-
-Colour = tuple[int, int, int]
-ORANGE, LIGHT_ORANGE = (224, 123, 57), (240, 173, 120)  # side A: L1, L2
-BLUE, LIGHT_BLUE = (52, 120, 190), (120, 175, 225)  # side E: L4, L3
-GREEN, RED, GREY, LIGHT_GREY = (60, 170, 90), (214, 69, 80), (110, 110, 116), (190, 190, 196)
 COLOURS: dict[str, Colour] = {"L1": ORANGE, "L2": LIGHT_ORANGE, "L3": LIGHT_BLUE, "L4": BLUE}
 
 ACROSS = (math.sqrt(0.5), 0.0, 0.0, math.sqrt(0.5))
 """The turn (x, y, z, w) that lays a cylinder along y."""
-
-
-class Motion(NamedTuple):
-    """Where everything is in the rows that are drawn.
-
-    Attributes:
-        q: (theta_A, theta_B, theta_E, theta_D) [rad], (n, 4).
-        foot: F [m], hip frame, (n, 2).
-        target: Where F should be [m], (n, 2).
-    """
-
-    q: Array
-    foot: Array
-    target: Array
 
 
 def in_space(points: ArrayLike) -> Array:
@@ -81,54 +70,56 @@ def link_frames(leg: FiveBar, q: Array) -> dict[str, tuple[Array, Array]]:
     }
 
 
-def log_leg(stream: rr.RecordingStream, leg: FiveBar) -> None:
+def log_leg(stream: rr.RecordingStream, leg: FiveBar, look: Look) -> None:
     """Log what does not change: the links, each in its own frame, the base and the motors."""
     import rerun as rr
 
-    stream.log("/", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
-    r = leg.radius
+    hip, r = f"{look.root}{HIP}", leg.radius
     for name, side in (("L1", -1), ("L2", -1), ("L3", 1), ("L4", 1)):
         bars = [(0.0, getattr(leg, name), 0.0)]
         if name == "L2" and leg.L6 > 0.0:
             bars.append((leg.L2, leg.L6, leg.bend))
-        stream.log(f"{HIP}/{name}", _bars(bars, side * r, r, COLOURS[name]), static=True)
+        stream.log(
+            f"{hip}/{name}", _bars(bars, side * r, r, look.colour(COLOURS[name])), static=True
+        )
 
     for joint, link, length, y, width in (
         ("B", "L1", leg.L1, -r, 2.8 * r),
         ("C", "L2", leg.L2, 0.0, 4.8 * r),
         ("D", "L4", leg.L4, r, 2.8 * r),
     ):
-        pin = _axle((length, y, 0.0), width, 0.6 * r, joint)
-        stream.log(f"{HIP}/{link}/{joint}", pin, static=True)
+        pin = _axle((length, y, 0.0), width, 0.6 * r, joint, PURPLE, look)
+        stream.log(f"{hip}/{link}/{joint}", pin, static=True)
 
     foot = rr.Ellipsoids3D(
         radii=[leg.foot_radius],
         centers=in_space([leg.foot_offset]),
-        colors=[RED],
+        colors=[look.colour(RED)],
+        labels=[look.label] if look.label else None,
         fill_mode="solid",
     )
-    stream.log(f"{HIP}/L2/foot", foot, static=True)
-    _log_base(stream, leg)
+    stream.log(f"{hip}/L2/foot", foot, static=True)
+    _log_base(stream, leg, look)
 
 
-def _log_base(stream: rr.RecordingStream, leg: FiveBar) -> None:
+def _log_base(stream: rr.RecordingStream, leg: FiveBar, look: Look) -> None:
     """Log the bar A-E and the two motors, each on the outer side of its link."""
     import rerun as rr
 
     r = leg.radius
     for joint, base, y in zip("AE", bases(leg), (-3.5 * r, 3.5 * r), strict=True):
-        motor = _axle((base[0], y, base[1]), 3.0 * r, 2.0 * r, joint)
-        stream.log(f"{HIP}/{joint}", motor, static=True)
+        motor = _axle((base[0], y, base[1]), 3.0 * r, 2.0 * r, joint, GREY, look)
+        stream.log(f"{look.root}{HIP}/{joint}", motor, static=True)
     if leg.L5 > 0.0:
         bar = rr.Capsules3D(
             lengths=[leg.L5],
             radii=[0.8 * r],
             translations=in_space(bases(leg)[:1]),
             quaternions=[turn(leg.tilt - 0.5 * math.pi)],
-            colors=[GREY],
+            colors=[look.colour(GREY)],
             fill_mode="solid",
         )
-        stream.log(f"{HIP}/L5", bar, static=True)
+        stream.log(f"{look.root}{HIP}/L5", bar, static=True)
 
 
 def _bars(
@@ -149,9 +140,14 @@ def _bars(
 
 
 def _axle(
-    centre: tuple[float, float, float], width: float, radius: float, label: str
+    centre: tuple[float, float, float],
+    width: float,
+    radius: float,
+    joint: str,
+    colour: Colour,
+    look: Look,
 ) -> rr.Cylinders3D:
-    """Return a labelled cylinder along y, about its centre."""
+    """Return a cylinder along y, about its centre; a leg that is alone has its joints labelled."""
     import rerun as rr
 
     return rr.Cylinders3D(
@@ -159,67 +155,21 @@ def _axle(
         radii=[radius],
         centers=[centre],
         quaternions=[ACROSS],
-        colors=[LIGHT_GREY],
-        labels=[label],
+        colors=[look.colour(colour)],
+        labels=None if look.label else [joint],
         fill_mode="solid",
     )
 
 
-def log_path(stream: rr.RecordingStream, target: Array) -> None:
-    """Log the whole target path (n, 2) [m] as one line, and how target and trail look."""
-    import rerun as rr
-
-    path = rr.LineStrips3D([in_space(target)], radii=rr.Radius.ui_points(2.5), colors=[GREEN])
-    stream.log(TARGET_PATH, path, static=True)
-    for entity, colour, points in ((TARGET, GREEN, 2.0), (TRAIL, RED, 1.0)):
-        look = rr.LineStrips3D.from_fields(radii=rr.Radius.ui_points(points), colors=[colour])
-        stream.log(entity, look, static=True)
-
-
-def send_motion(
-    stream: rr.RecordingStream, leg: FiveBar, motion: Motion, times: list[rr.TimeColumn]
+def send_leg(
+    stream: rr.RecordingStream, leg: FiveBar, moved: Motion, look: Look, times: list[rr.TimeColumn]
 ) -> None:
-    """Send the poses of the links, the target and the trail, as columns.
-
-    The target is a needle across the leg plane, to be seen on both sides of the foot; a row of
-    the trail is the line from the row before.
-    """
+    """Send the poses of the links as columns, and that of the hip where it moves."""
     import rerun as rr
 
-    for name, (origin, angle) in link_frames(leg, motion.q).items():
+    for name, (origin, angle) in link_frames(leg, moved.q).items():
         poses = rr.Transform3D.columns(translation=in_space(origin), quaternion=turn(angle))
-        stream.send_columns(f"{HIP}/{name}", times, poses)
-
-    tip = np.array([0.0, 2.5 * leg.foot_radius, 0.0])
-    target = in_space(motion.target)
-    needle = np.stack([target - tip, target + tip], axis=1)
-    foot = in_space(motion.foot)
-    steps = np.stack([np.concatenate([foot[:1], foot[:-1]]), foot], axis=1)
-    for entity, strips in ((TARGET, needle), (TRAIL, steps)):
-        columns = rr.LineStrips3D.columns(strips=strips.astype(np.float32))
-        stream.send_columns(entity, times, columns)
-
-
-def view(leg: FiveBar, motion: Motion) -> rrb.Spatial3DView:
-    """Return the 3D view: from the front, slightly above, all of the motion in sight."""
-    import rerun.blueprint as rrb
-
-    p = chain_points(leg, motion.q)
-    everything = np.concatenate([*bases(leg), *(point.reshape(-1) for point in p)]).reshape(-1, 2)
-    low, high = everything.min(axis=0), everything.max(axis=0)
-    centre = in_space(0.5 * (low + high))
-    distance = 1.4 * float(np.max(high - low)) + 2.0 * leg.foot_radius
-    trail = rrb.VisibleTimeRanges(
-        timeline="sim_time",
-        start=rrb.TimeRangeBoundary.cursor_relative(seconds=-TRAIL_SECONDS),
-        end=rrb.TimeRangeBoundary.cursor_relative(),
-    )
-    return rrb.Spatial3DView(
-        origin="/",
-        name="Leg",
-        eye_controls=rrb.EyeControls3D(
-            position=centre + distance * np.array([0.25, -1.0, 0.25]), look_target=centre
-        ),
-        line_grid=False,
-        overrides={TRAIL: trail},
-    )
+        stream.send_columns(f"{look.root}{HIP}/{name}", times, poses)
+    if moved.hip is not None:
+        heights = rr.Transform3D.columns(translation=in_space(in_height(moved.hip)))
+        stream.send_columns(f"{look.root}{HIP}", times, heights)

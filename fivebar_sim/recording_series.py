@@ -1,22 +1,29 @@
-"""What a recording says in numbers: the plots of a record, and its metrics as text."""
+"""The plots of a recording: what a record says as lines over time, in units that people read."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from typing import Any, NamedTuple
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from fivebar_sim import ground
 from fivebar_sim.arrays import Array, Bools
-from fivebar_sim.recording_scene import (
+from fivebar_sim.metrics import Record, tracking_error
+from fivebar_sim.recording_look import (
     BLUE,
     GREEN,
+    GREY,
     LIGHT_BLUE,
     LIGHT_ORANGE,
     ORANGE,
     RED,
     Colour,
 )
+from fivebar_sim.recording_motion import points, timestep
+
+if TYPE_CHECKING:
+    from fivebar_sim.scenario import Scenario
 
 SHARE_WINDOW = 0.05
 """Width of the window over which the load share is taken [s]."""
@@ -25,10 +32,10 @@ SHARE_FLOOR = 1e-6
 
 
 class Series(NamedTuple):
-    """One plot.
+    """Lines of one plot.
 
     Attributes:
-        path: Entity.
+        path: Entity; its first part is the plot, so that "torque/limit" is drawn with "torque".
         title: What is plotted, with its unit.
         lines: Name and colour of each line.
         values: In the title's unit, (n, len(lines)).
@@ -43,41 +50,61 @@ class Series(NamedTuple):
     shown: Bools
     bounds: tuple[float, float] | None = None
 
-
-def timestep(time: Array) -> float:
-    """Return h [s] of the times h, 2 h, ... N h."""
-    return float(time[-1]) / len(time)
-
-
-def points(record: Mapping[str, Array], name: str) -> Array:
-    """Return the points (x, z) [m] of two columns, (N, 2)."""
-    return np.stack([record[f"{name}_x"], record[f"{name}_z"]], axis=-1)
+    @property
+    def plot(self) -> str:
+        """The plot that it is drawn in."""
+        return self.path.split("/")[0]
 
 
-def series(record: Mapping[str, Array]) -> Iterator[Series]:
-    """Yield the plots of a record, in the order in which they are shown."""
+MOTORS = {"A": ORANGE, "E": BLUE}
+JOINTS = {"theta_A": ORANGE, "theta_B": LIGHT_ORANGE, "theta_E": BLUE, "theta_D": LIGHT_BLUE}
+COMMANDS = {"ctrl_A": RED, "ctrl_E": GREEN}
+
+
+def series(scenario: Scenario, record: Record) -> Iterator[Series]:
+    """Yield the plots of a run, in the order in which they are shown.
+
+    Commands are drawn with what they are: angles with the joints, torques with the motors.
+    """
     every = np.ones(len(record["time"]), dtype=bool)
-    error = np.hypot(*(points(record, "foot") - points(record, "target")).T)
-    torque = np.stack([record["torque_A"], record["torque_E"]], axis=-1)
+    error, torque = tracking_error(record), _columns(record, "torque_A", "torque_E")
     share, loaded = load_share(torque, round(0.5 * SHARE_WINDOW / timestep(record["time"])))
-    angles = {
-        "theta_A": ORANGE,
-        "theta_B": LIGHT_ORANGE,
-        "theta_E": BLUE,
-        "theta_D": LIGHT_BLUE,
-        "ctrl_A": RED,
-        "ctrl_E": GREEN,
-    }
-    degrees = np.degrees(np.stack([record[column] for column in angles], axis=-1))
-    motors = {"A": ORANGE, "E": BLUE}
+    in_torque = getattr(scenario.controller, "drive", "position") == "torque"
 
     yield Series(
         "tracking_error", "Tracking error [mm]", {"error": RED}, 1e3 * error[:, None], every
     )
-    yield Series("torque", "Motor torques [mN m]", motors, 1e3 * torque, every)
+    yield from _torques(scenario, record, torque, every, in_torque=in_torque)
     yield Series("load_share", "Load share of A", {"A": ORANGE}, share[:, None], loaded, (0.0, 1.0))
     yield Series("gap", "Loop gap [um]", {"gap": GREEN}, 1e6 * record["gap"][:, None], every)
-    yield Series("angles", "Joint angles, setpoints [deg]", angles, degrees, every)
+    angles = JOINTS if in_torque else JOINTS | COMMANDS
+    title = "Joint angles [deg]" if in_torque else "Joint angles, setpoints [deg]"
+    yield Series("angles", title, angles, np.degrees(_columns(record, *angles)), every)
+    if "ground_z" in record:
+        height = 1e3 * ground.height(scenario.leg, record)[:, None]
+        force = points(record, "ground")
+        yield Series("ground_force", "Ground force [N]", {"x": ORANGE, "z": BLUE}, force, every)
+        yield Series("foot_height", "Foot height [mm]", {"foot": GREEN}, height, every)
+
+
+def _torques(
+    scenario: Scenario, record: Record, torque: Array, every: Bools, *, in_torque: bool
+) -> Iterator[Series]:
+    """Yield the motor torques, the commanded ones of a torque drive, and the servo's limits."""
+    title, limit = "Motor torques [mN m]", scenario.servo.limit
+    yield Series("torque", title, MOTORS, 1e3 * torque, every)
+    if in_torque:
+        yield Series(
+            "torque/ctrl", title, COMMANDS, 1e3 * _columns(record, "ctrl_A", "ctrl_E"), every
+        )
+    if limit is not None:
+        both = np.tile([1e3 * limit, -1e3 * limit], (len(every), 1))
+        yield Series("torque/limit", title, {"limit": GREY, "-limit": GREY}, both, every)
+
+
+def _columns(record: Record, *names: str) -> Array:
+    """Return columns side by side, (N, len(names))."""
+    return np.stack([record[name] for name in names], axis=-1)
 
 
 def load_share(torque: Array, half: int) -> tuple[Array, Bools]:
@@ -101,37 +128,3 @@ def load_share(torque: Array, half: int) -> tuple[Array, Bools]:
     impulse = total[high] - total[low]
     loaded = impulse.max(axis=1) >= SHARE_FLOOR * (high - low)
     return impulse[loaded, 0] / impulse[loaded].sum(axis=1), loaded
-
-
-def summary(metrics: Mapping[str, Any], name: str) -> str:
-    """Return the metrics as Markdown: name, verdict, a table by dotted keys, the provenance."""
-    rest = {k: v for k, v in metrics.items() if k not in ("verdict", "provenance")}
-    lines = [f"# {name}", ""]
-    if "verdict" in metrics:
-        lines += [f"**{str(metrics['verdict']).upper()}**", ""]
-    lines += ["| metric (SI) | value |", "|:--|--:|"]
-    lines += [f"| {key} | {_plain(value)} |" for key, value in _flat(rest)]
-    if "provenance" in metrics:
-        facts = (f"{key} {_plain(value)}" for key, value in _flat(metrics["provenance"]))
-        lines += ["", f"*{', '.join(facts)}*"]
-    return "\n".join(lines) + "\n"
-
-
-def _flat(table: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
-    """Yield the values of nested tables by dotted keys."""
-    for key, value in table.items():
-        if isinstance(value, Mapping):
-            yield from _flat(value, f"{prefix}{key}.")
-        else:
-            yield f"{prefix}{key}", value
-
-
-def _plain(value: Any) -> str:
-    """Return a value for a Markdown table: numbers to five digits, lists by commas."""
-    if isinstance(value, (np.generic, np.ndarray)):
-        value = value.tolist()
-    if isinstance(value, float):
-        return f"{value:.5g}"
-    if isinstance(value, (list, tuple)):
-        return ", ".join(_plain(item) for item in value) or "none"
-    return " ".join(str(value).replace("|", "\\|").split())

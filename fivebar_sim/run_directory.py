@@ -92,9 +92,7 @@ def _fill(stage: Path, result: Result) -> None:
     text = json.dumps(result.metrics, indent=2, allow_nan=False)
     (stage / "metrics.json").write_text(text + "\n", encoding="utf-8")
     write_record(stage / "rollout.parquet", result.record)
-    recording.write(
-        stage / "recording.rrd", scenario.leg, result.record, result.metrics, scenario.name
-    )
+    recording.write(stage / "recording.rrd", [result])
 
 
 def write_record(path: Path, record: Mapping[str, Array]) -> None:

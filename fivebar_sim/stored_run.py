@@ -21,6 +21,9 @@ COLUMNS = (
 )
 """What every record has; scenes with a ground have more."""
 
+SOURCES = ("scenario.toml", "metrics.json", "rollout.parquet")
+"""What a run is read from; its recording is derived, and may be missing."""
+
 
 class StoredRun(NamedTuple):
     """What a run directory holds.
@@ -42,10 +45,11 @@ def read(path: Path) -> StoredRun:
     """Return the run of a directory.
 
     Raises:
-        RunDirectoryError: It is no complete run directory, or a file of it is damaged or foreign;
-            names the file.
+        RunDirectoryError: It lacks one of `SOURCES`, or a file of it is damaged or foreign; names
+            the file.
     """
-    run_directory.check_run(path)
+    if not all((path / name).is_file() for name in SOURCES):
+        run_directory.check_run(path)
     try:
         scenario = Scenario.load(path / "scenario.toml")
     except FiveBarError as error:

@@ -9,15 +9,15 @@ import sys
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 import rerun as rr
-from recorded import COAXIAL, LEG, ellipse, read, written
+from recorded import COAXIAL, LEG, digest, drawn, ellipse, read, standing, written
 from rerun.chunk import RrdReader
 
 from fivebar_sim import recording
-from fivebar_sim.errors import FiveBarError
 
 
 def test_times_are_exact_and_nothing_else_is_a_timeline(tmp_path: Path) -> None:
@@ -29,24 +29,6 @@ def test_times_are_exact_and_nothing_else_is_a_timeline(tmp_path: Path) -> None:
         np.testing.assert_array_equal(moving[entity]["step"], step)
     names = {name for columns in moving.values() for name in columns if ":" not in name}
     assert names == {"sim_time", "step"}
-
-
-def test_scalars_are_the_record(tmp_path: Path) -> None:
-    r = ellipse(LEG, 300)
-    moving, static = read(written(tmp_path / "a.rrd", LEG, r))
-    angles = ["theta_A", "theta_B", "theta_E", "theta_D", "ctrl_A", "ctrl_E"]
-    expected = {
-        "/tracking_error": {
-            "error": 1e3 * np.hypot(r["foot_x"] - r["target_x"], r["foot_z"] - r["target_z"])
-        },
-        "/torque": {"A": 1e3 * r["torque_A"], "E": 1e3 * r["torque_E"]},
-        "/gap": {"gap": 1e6 * r["gap"]},
-        "/angles": {name: np.degrees(r[name]) for name in angles},
-    }
-    for entity, lines in expected.items():
-        assert static[entity]["SeriesLines:names"] == [list(lines)]
-        scalars = np.array(moving[entity]["Scalars:scalars"])
-        np.testing.assert_array_equal(scalars, np.stack(list(lines.values()), axis=-1))
 
 
 @pytest.mark.parametrize(
@@ -63,10 +45,29 @@ def test_poses_are_thinned_and_end_with_the_last(
     tmp_path: Path, steps: int, timestep: float, rows: list[int]
 ) -> None:
     moving, _ = read(written(tmp_path / "a.rrd", COAXIAL, ellipse(COAXIAL, steps, timestep)))
-    for entity in ("/hip/L1", "/hip/L3", "/hip/target", "/hip/foot_trail"):
+    for entity in ("/hip/L1", "/hip/L3", "/hip/target", "/foot_trail/0"):
         assert moving[entity]["step"] == [row + 1 for row in rows]
         nanoseconds = [round(1e9 * timestep) * (row + 1) for row in rows]
         assert moving[entity]["sim_time"] == nanoseconds
+
+
+def layout_of(path: Path) -> tuple[list[str], list[str], dict[str, Any]]:
+    """Return origins and contents of a layout's views, and the visible ranges by entity."""
+    reader = RrdReader(path)
+    (layout,) = reader.blueprints()
+    origins: list[str] = []
+    contents: list[str] = []
+    ranges: dict[str, Any] = {}
+    for chunk in reader.stream(store=layout):
+        batch = chunk.to_record_batch()
+        if "ViewBlueprint:space_origin" in batch.schema.names:
+            origins += batch["ViewBlueprint:space_origin"].to_pylist()[0]
+        if "ViewContents:query" in batch.schema.names:
+            contents += batch["ViewContents:query"].to_pylist()[0]
+        if "VisibleTimeRanges:ranges" in batch.schema.names:
+            entity = chunk.entity_path.split("/overrides")[1].removesuffix("/visualizers")
+            ((ranges[entity],),) = batch["VisibleTimeRanges:ranges"].to_pylist()
+    return origins, contents, dict(sorted(ranges.items()))
 
 
 def test_layout_and_identity_come_with_the_file(tmp_path: Path) -> None:
@@ -76,18 +77,18 @@ def test_layout_and_identity_come_with_the_file(tmp_path: Path) -> None:
     assert (data.application_id, data.recording_id) == ("fivebar", "round and round")
     assert layout.application_id == "fivebar"
     moving, static = read(path)
-    views: list[str] = []
-    trail = None
-    for chunk in reader.stream(store=layout):
-        batch = chunk.to_record_batch()
-        if "ViewBlueprint:space_origin" in batch.schema.names:
-            views += batch["ViewBlueprint:space_origin"].to_pylist()[0]
-        if chunk.entity_path.endswith("/overrides/hip/foot_trail/visualizers"):
-            ((trail,),) = batch["VisibleTimeRanges:ranges"].to_pylist()
-    shown = ["/", "angles", "gap", "load_share", "summary", "torque", "tracking_error"]
-    assert sorted(views) == shown
-    assert trail == {"timeline": "sim_time", "range": {"start": -500_000_000, "end": 0}}
-    assert {f"/{view}" for view in shown[1:]} < static.keys()
+    origins, contents, trails = layout_of(path)
+    assert sorted(origins) == ["/"] * 6 + ["summary"]
+    plots = ("angles", "gap", "load_share", "torque", "tracking_error")
+    assert sorted(contents) == sorted(
+        ["$origin/**", *(f"/{plot}/**" for plot in plots), "$origin/**"]
+    )
+    assert {f"/{plot}" for plot in (*plots, "summary")} < static.keys()
+    # each band of the trail goes on where the one before ends, from the foot backwards
+    assert list(trails) == [f"/foot_trail/{k}" for k in range(6)]
+    ends = [(-band["range"]["start"], -band["range"]["end"]) for band in trails.values()]
+    assert ends == [(100_000_000 * (k + 1), 100_000_000 * k) for k in range(6)]
+    assert {band["timeline"] for band in trails.values()} == {"sim_time"}
     assert static["/"]["ViewCoordinates:xyz"] == [[[3, 5, 1]]]  # right, forward, up
     # no time of writing: what a record gives is the same whenever it is drawn
     assert static["/__properties"] == {"RecordingInfo:name": [["round and round"]]}
@@ -101,9 +102,44 @@ def test_leg_is_a_property_whatever_was_written_before(tmp_path: Path) -> None:
         assert json.loads(text) == json.loads(json.dumps(asdict(leg)))
 
 
-def test_ten_seconds_fit_in_four_megabytes(tmp_path: Path) -> None:
-    path = written(tmp_path / "a.rrd", LEG, ellipse(LEG, 10_000))
+@pytest.mark.parametrize("ground", [False, True])
+def test_ten_seconds_fit_in_four_megabytes(tmp_path: Path, ground: bool) -> None:
+    record = ellipse(LEG, 10_000)
+    path = written(tmp_path / "a.rrd", LEG, standing(record) if ground else record)
     assert path.stat().st_size <= 400 * 10_000
+
+
+def test_equal_runs_have_equal_content(tmp_path: Path) -> None:
+    record = ellipse(LEG, 50)
+    first, second = (digest(written(tmp_path / name, LEG, record)) for name in ("a.rrd", "b.rrd"))
+    assert first == second
+    record["gap"][7] = np.nextafter(record["gap"][7], 1.0)
+    assert digest(written(tmp_path / "c.rrd", LEG, record)) != first
+
+
+def test_several_runs_lie_over_each_other(tmp_path: Path) -> None:
+    runs = [drawn(LEG, ellipse(LEG, 40)), drawn(COAXIAL, standing(ellipse(COAXIAL, 60, 0.002)))]
+    recording.write(tmp_path / "a.rrd", runs, ["one", "two"])
+    moving, static = read(tmp_path / "a.rrd")
+    for k, (run, label) in enumerate(zip(runs, ("one", "two"), strict=True), start=1):
+        recording.write(tmp_path / "own.rrd", [run])
+        own, still = read(tmp_path / "own.rrd")
+        for entity, columns in own.items():
+            if entity not in ("/ground_force", "/belt"):  # made for the room of all runs
+                assert moving[f"/run_{k}{entity}"] == columns
+        assert static[f"/run_{k}/torque"]["SeriesLines:names"] == [[f"{label}: A", f"{label}: E"]]
+        assert static[f"/run_{k}/hip/L2/foot"]["Ellipsoids3D:labels"] == [[label]]
+        colours = f"/run_{k}/hip/L1", "Capsules3D:colors"
+        assert static[colours[0]][colours[1]] != still["/hip/L1"]["Capsules3D:colors"]
+    assert (
+        static["/run_1/hip/L1"]["Capsules3D:colors"] != static["/run_2/hip/L1"]["Capsules3D:colors"]
+    )
+    _, contents, trails = layout_of(tmp_path / "a.rrd")
+    assert {"/run_1/torque/**", "/run_2/torque/**", "/run_2/foot_height/**"} < set(contents)
+    assert {"/run_1/foot_trail/0", "/run_2/foot_trail/5"} < set(trails)
+    (text,) = static["/summary"]["TextDocument:text"][0]
+    assert "## one: FAIL" in text
+    assert "| metric | one | two |" in text
 
 
 def test_rerun_is_imported_only_to_write() -> None:
@@ -164,20 +200,3 @@ def test_unwritable_file_is_an_os_error(tmp_path: Path) -> None:
 def test_full_disk_is_an_os_error() -> None:
     with pytest.raises(OSError, match="No space left"):
         written(Path("/dev/full"), LEG, ellipse(LEG, 50))
-
-
-def test_viewer_is_the_binary_and_binds_the_loopback(tmp_path: Path) -> None:
-    command = recording.viewer_command(tmp_path / "a.rrd")
-    assert command[-1] == str((tmp_path / "a.rrd").resolve())
-    assert command[command.index("--bind") + 1] == "127.0.0.1"
-    shown = subprocess.run([command[0], "--help"], capture_output=True, text=True, check=True)
-    for flag in (word for word in command if word.startswith("--")):
-        assert flag in shown.stdout
-
-
-def test_missing_viewer_is_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
-    with pytest.raises(recording.ViewerMissingError, match="rerun_cli") as caught:
-        recording.viewer_command(Path("a.rrd"))
-    assert isinstance(caught.value, FiveBarError)
-    assert isinstance(caught.value, FileNotFoundError)

@@ -11,23 +11,54 @@ from tyro.conf import Positional, arg
 
 from fivebar_sim.errors import ConfigError
 
+RunDir = Positional[Annotated[Path, arg(metavar="RUN_DIR")]]
+RunDirs = Positional[Annotated[tuple[Path, ...], arg(metavar="[RUN_DIR ...]")]]
 
-def replay(run_dir: Positional[Annotated[Path, arg(metavar="RUN_DIR")]], /) -> int:
-    """Open the recording of a run in the Rerun viewer, on this machine only.
+
+def replay(run_dir: RunDir, others: RunDirs = (), /, *, web: bool = False, port: int = 0) -> int:
+    """Open the recording of a run in the Rerun viewer, or several over each other; here only.
 
     Args:
         run_dir: A run directory that `fivebar run` wrote.
+        others: More of them, to be shown over the first and told apart by colour.
+        web: Serve it to a browser on this machine, until Ctrl-C, instead of opening a window.
+        port: Where --web serves; 0 is any port that is free.
     """
+    run_dirs = (run_dir, *others)
+    if web:
+        return _serve(run_dirs, port)
+    if port:
+        raise ConfigError(f"--port is of --web, got --port {port} alone")
+    return _show(run_dirs)
+
+
+def _show(run_dirs: tuple[Path, ...]) -> int:
+    """Show the recording in the native viewer, until it is closed."""
     import subprocess
 
-    from fivebar_sim import recording, run_directory
+    from fivebar_sim import recording_file, recording_viewer
 
-    run_directory.check_run(run_dir)
-    command = recording.viewer_command(run_dir / "recording.rrd")
-    if sys.platform == "linux" and not {"DISPLAY", "WAYLAND_DISPLAY"} & os.environ.keys():
-        raise ConfigError(
-            f"no screen here: neither DISPLAY nor WAYLAND_DISPLAY is set; open "
-            f"{run_dir / 'recording.rrd'} with Rerun on a machine that has one"
-        )
-    quiet = {**os.environ, "CI": "true"}  # keeps Rerun's analytics off
-    return subprocess.run(command, env=quiet).returncode
+    with recording_file.opened(run_dirs) as file:
+        command = recording_viewer.native(file)
+        if sys.platform == "linux" and not {"DISPLAY", "WAYLAND_DISPLAY"} & os.environ.keys():
+            raise ConfigError(
+                "no screen here: neither DISPLAY nor WAYLAND_DISPLAY is set; `fivebar replay "
+                f"{' '.join(map(str, run_dirs))} --web` shows it in a browser"
+            )
+        return subprocess.run(command, env=recording_viewer.quiet()).returncode
+
+
+def _serve(run_dirs: tuple[Path, ...], port: int) -> int:
+    """Serve the recording to browsers, until Ctrl-C, which is the way to end it: status 0."""
+    from fivebar_sim import recording_file, web
+
+    title = " + ".join(recording_file.called(run_dirs))
+    try:
+        with web.Server(port) as server:
+            with recording_file.opened(run_dirs) as file:
+                server.pages = web.pages(file, title)
+            print(f"{title}: {server.url} (Ctrl-C ends it)", flush=True)  # noqa: T201
+            server.serve_forever()
+    except KeyboardInterrupt:
+        pass
+    return 0

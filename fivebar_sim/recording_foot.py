@@ -1,0 +1,95 @@
+"""The foot of a recording: its target path, where it should be now, and the trail behind it.
+
+The target lies in the hip frame and moves with the hip; the trail stays where the foot has been.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from fivebar_sim.arrays import Array
+from fivebar_sim.geometry import FiveBar
+from fivebar_sim.recording_look import GREEN, RED, Colour, Look
+from fivebar_sim.recording_motion import Motion
+from fivebar_sim.recording_scene import HIP, in_space
+
+if TYPE_CHECKING:
+    import rerun as rr
+
+TARGET, TARGET_PATH = f"{HIP}/target", f"{HIP}/target_path"
+TRAIL_SECONDS = 0.6
+"""How long the trail of the foot stays [s]."""
+BACKGROUND: Colour = (24, 26, 30)
+"""What the trail fades into."""
+
+
+class Band(NamedTuple):
+    """A part of the trail, by its age.
+
+    Attributes:
+        entity: Under the run's root.
+        oldest: Age of its far end [s].
+        newest: Age of its near end [s].
+        fresh: 1 beside the foot, towards 0 where the trail ends.
+    """
+
+    entity: str
+    oldest: float
+    newest: float
+    fresh: float
+
+
+TRAIL = tuple(
+    Band(f"foot_trail/{k}", TRAIL_SECONDS * (k + 1) / 6, TRAIL_SECONDS * k / 6, 1.0 - k / 6)
+    for k in range(6)
+)
+"""The trail fades in steps: each band is drawn over its own ages, thinner and darker."""
+
+
+def log_foot(stream: rr.RecordingStream, target: Array, look: Look) -> None:
+    """Log the whole target path (n, 2) [m] as one line, and how target and trail look."""
+    import rerun as rr
+
+    green = look.colour(GREEN)
+    path = rr.LineStrips3D([in_space(target)], radii=rr.Radius.ui_points(1.5), colors=[green])
+    stream.log(f"{look.root}{TARGET_PATH}", path, static=True)
+    needle = rr.LineStrips3D.from_fields(radii=rr.Radius.ui_points(2.0), colors=[green])
+    stream.log(f"{look.root}{TARGET}", needle, static=True)
+    for band in TRAIL:
+        line = rr.LineStrips3D.from_fields(
+            radii=rr.Radius.ui_points(0.5 + 2.0 * band.fresh),
+            colors=[faded(look.colour(RED), band.fresh)],
+        )
+        stream.log(f"{look.root}{band.entity}", line, static=True)
+
+
+def faded(colour: Colour, fresh: float) -> Colour:
+    """Return a colour between the background (fresh = 0) and itself (fresh = 1)."""
+    red, green, blue = (
+        round(fresh * own + (1.0 - fresh) * behind)
+        for own, behind in zip(colour, BACKGROUND, strict=True)
+    )
+    return red, green, blue
+
+
+def send_foot(
+    stream: rr.RecordingStream, leg: FiveBar, moved: Motion, look: Look, times: list[rr.TimeColumn]
+) -> None:
+    """Send the target and the trail, as columns.
+
+    The target is a needle across the leg plane, to be seen on both sides of the foot; a row of
+    the trail is the way from the row before.
+    """
+    import rerun as rr
+
+    tip = np.array([0.0, 2.5 * leg.foot_radius, 0.0])
+    target = in_space(moved.target)
+    foot = in_space(moved.world_foot)
+    strips = {TARGET: np.stack([target - tip, target + tip], axis=1)}
+    steps = np.stack([np.concatenate([foot[:1], foot[:-1]]), foot], axis=1)
+    strips |= {band.entity: steps for band in TRAIL}
+    for entity, lines in strips.items():
+        columns = rr.LineStrips3D.columns(strips=lines.astype(np.float32))
+        stream.send_columns(f"{look.root}{entity}", times, columns)

@@ -1,0 +1,81 @@
+"""The ground of a recording: the floor, the belt that runs on it, its force on the foot."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from fivebar_sim.geometry import FiveBar
+from fivebar_sim.recording_look import GREY, LIGHT_GREY, YELLOW, Look
+from fivebar_sim.recording_motion import Motion, Stage
+from fivebar_sim.recording_scene import in_space
+
+if TYPE_CHECKING:
+    import rerun as rr
+
+FLOOR, BELT, FORCE = "floor", "belt", "ground_force"
+MARGIN, WIDTH = 0.4, 0.6
+"""How far the floor reaches beyond the leg, and how wide it is, in sizes of the leg."""
+STRIPES = 8
+"""Stripes across a belt."""
+
+
+def log_floor(stream: rr.RecordingStream, stage: Stage) -> None:
+    """Log the floor under all legs; its surface is at z = 0."""
+    import rerun as rr
+
+    half, y, thick = 0.5 * _length(stage), 0.5 * WIDTH * stage.size, 0.01 * stage.size
+    floor = rr.Boxes3D(
+        centers=[[_start(stage) + half, 0.0, -thick]],
+        half_sizes=[[half, y, thick]],
+        colors=[GREY],
+        fill_mode="solid",
+    )
+    stream.log(FLOOR, floor, static=True)
+
+
+def _start(stage: Stage) -> float:
+    return float(stage.low[0]) - MARGIN * stage.size
+
+
+def _length(stage: Stage) -> float:
+    return float(stage.high[0] - stage.low[0]) + 2.0 * MARGIN * stage.size
+
+
+def send_ground(
+    stream: rr.RecordingStream,
+    leg: FiveBar,
+    moved: Motion,
+    look: Look,
+    times: list[rr.TimeColumn],
+    stage: Stage,
+) -> None:
+    """Send the ground's force on the foot and the belt, as columns, where there are any.
+
+    The force is an arrow from the contact, none while the foot is in the air. The stripes run with
+    the belt, and go back to where they began when it has gone one gap between them.
+    """
+    import rerun as rr
+
+    if moved.force is not None:
+        arrow = rr.Arrows3D.from_fields(radii=[0.3 * leg.radius], colors=[look.colour(YELLOW)])
+        stream.log(f"{look.root}{FORCE}", arrow, static=True)
+        down = moved.force[:, 1] > 0.0
+        contact = moved.world_foot - np.array([0.0, leg.foot_radius])
+        arrows = rr.Arrows3D.columns(
+            origins=in_space(contact[down]),
+            vectors=in_space(stage.metre_per_newton * moved.force[down]),
+        )
+        stream.send_columns(f"{look.root}{FORCE}", times, arrows.partition(down.astype(np.intp)))
+    if moved.belt is not None:
+        gap, y = _length(stage) / STRIPES, 0.5 * WIDTH * stage.size
+        starts = _start(stage) + gap * np.arange(STRIPES)
+        stripes = [[[x, -y, 0.0], [x, y, 0.0]] for x in starts]
+        lines = rr.LineStrips3D(
+            stripes, radii=[0.004 * stage.size], colors=[look.colour(LIGHT_GREY)]
+        )
+        stream.log(f"{look.root}{BELT}", lines, static=True)
+        shift = in_space(np.stack([np.mod(moved.belt, gap), np.zeros_like(moved.belt)], axis=-1))
+        columns = rr.Transform3D.columns(translation=shift)
+        stream.send_columns(f"{look.root}{BELT}", times, columns)

@@ -1,0 +1,121 @@
+"""The layout that a recording opens with: leg and verdict on the left, plots on the right."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from fivebar_sim.recording_foot import BACKGROUND, TRAIL
+from fivebar_sim.recording_look import Look
+from fivebar_sim.recording_motion import Stage
+from fivebar_sim.recording_scene import in_space
+from fivebar_sim.recording_series import Series
+
+if TYPE_CHECKING:
+    import rerun as rr
+    import rerun.blueprint as rrb
+    from rerun.blueprint.api import VisualizerLike
+    from rerun.encodings import EntityPathLike
+
+SUMMARY = "summary"
+LEGEND = 8
+"""The most lines that a legend has: a longer one hides its plot."""
+
+
+def contents(
+    stage: Stage, looks: Sequence[Look], plots: Sequence[Sequence[Series]]
+) -> rrb.Container:
+    """Return the views of all runs.
+
+    Args:
+        stage: The room that the legs need.
+        looks: Of each run.
+        plots: Of each run.
+    """
+    import rerun.blueprint as rrb
+
+    first: dict[str, Series] = {}
+    for each in (line for lines in plots for line in lines):
+        first.setdefault(each.plot, each)
+    views = [plot_view(plot, looks) for plot in first.values()]
+    text = rrb.TextDocumentView(origin=SUMMARY, name="Verdict")
+    left = rrb.Vertical(leg_view(stage, looks), text, row_shares=[3, 2])
+    return rrb.Horizontal(left, rrb.Grid(*views, grid_columns=2), column_shares=[2, 3])
+
+
+def leg_view(stage: Stage, looks: Sequence[Look]) -> rrb.Spatial3DView:
+    """Return the 3D view: from the front, slightly above, all of the motion in sight."""
+    import rerun.blueprint as rrb
+
+    centre = in_space(0.5 * (stage.low + stage.high))
+    distance = 1.4 * float(np.max(stage.high - stage.low)) + 0.1 * stage.size
+    trails: dict[EntityPathLike, VisualizerLike | Iterable[VisualizerLike]] = {
+        f"/{look.root}{band.entity}": rrb.VisibleTimeRanges(
+            timeline="sim_time",
+            start=rrb.TimeRangeBoundary.cursor_relative(nanos=_ago(band.oldest)),
+            end=rrb.TimeRangeBoundary.cursor_relative(nanos=_ago(band.newest)),
+        )
+        for look in looks
+        for band in TRAIL
+    }
+    return rrb.Spatial3DView(
+        origin="/",
+        name="Leg",
+        background=[*BACKGROUND, 255],
+        eye_controls=rrb.EyeControls3D(
+            position=centre + distance * np.array([0.25, -1.0, 0.25]), look_target=centre
+        ),
+        line_grid=False,
+        overrides=trails,
+    )
+
+
+def _ago(age: float) -> int:
+    """Return how long before the cursor an age [s] is [ns]; from seconds Rerun would truncate."""
+    return -round(1e9 * age)
+
+
+def plot_view(plot: Series, looks: Sequence[Look]) -> rrb.TimeSeriesView:
+    """Return the view of one plot, with the lines of all runs, and a legend where it helps."""
+    import rerun.blueprint as rrb
+
+    count = len(looks) * len(plot.lines)
+
+    return rrb.TimeSeriesView(
+        origin="/",
+        contents=[f"/{look.root}{plot.plot}/**" for look in looks],
+        name=plot.title,
+        axis_x=rrb.TimeAxis(link="LinkToGlobal"),
+        axis_y=rrb.ScalarAxis(range=plot.bounds) if plot.bounds else None,
+        plot_legend=rrb.PlotLegend(visible=1 < count <= LEGEND),
+    )
+
+
+def send(stream: rr.RecordingStream, views: rrb.Container) -> None:
+    """Send the layout.
+
+    Rerun logs it to a stream of its own, which would live (with threads and megabytes) until the
+    process ends: it belongs to a sink that belongs to it. Disconnecting parts the two.
+    """
+    import rerun.blueprint as rrb
+
+    streams: list[rr.RecordingStream] = []
+
+    class Layout(rrb.Blueprint):
+        def _log_to_stream(self, stream: rr.RecordingStream) -> None:
+            streams.append(stream)
+            super()._log_to_stream(stream)
+
+    layout = Layout(
+        views,
+        rrb.BlueprintPanel(state="collapsed"),
+        rrb.SelectionPanel(state="collapsed"),
+        rrb.TimePanel(state="collapsed", timeline="sim_time", loop_mode="all"),
+        auto_layout=False,
+        auto_views=False,
+    )
+    stream.send_blueprint(layout)
+    while streams:  # emptied, since a class lives until the next garbage collection
+        streams.pop().disconnect()

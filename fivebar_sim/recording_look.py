@@ -1,0 +1,59 @@
+"""Colours of a recording, and how several runs in one recording are told apart."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+Colour = tuple[int, int, int]
+
+ORANGE, LIGHT_ORANGE = (224, 123, 57), (240, 173, 120)  # side A: L1, L2
+BLUE, LIGHT_BLUE = (52, 120, 190), (120, 175, 225)  # side E: L4, L3
+GREEN, RED, GREY, LIGHT_GREY = (60, 170, 90), (214, 69, 80), (96, 96, 102), (140, 140, 148)
+YELLOW, PURPLE = (226, 196, 60), (150, 70, 170)
+
+TINTS: tuple[Colour, ...] = (
+    (240, 140, 40),
+    (60, 150, 250),
+    (70, 200, 100),
+    (215, 80, 200),
+    (60, 200, 200),
+    (225, 70, 70),
+)
+"""The colours of runs that are shown together; the seventh is that of the first again."""
+TINTED = 0.7
+"""How much of a run's colour is its own where several are shown; the rest is the part's."""
+
+
+class Look(NamedTuple):
+    """How one run looks beside others; one that is shown alone has no need of a look.
+
+    Attributes:
+        root: What its entities begin with, "" or "run_1/".
+        label: What it is called, or "".
+        tint: Its colour, or None where every part has its own.
+    """
+
+    root: str = ""
+    label: str = ""
+    tint: Colour | None = None
+
+    def colour(self, part: Colour) -> Colour:
+        """Return the colour of a part in this run: TINTED tint + (1 - TINTED) part."""
+        if self.tint is None:
+            return part
+        red, green, blue = (
+            round(TINTED * own + (1.0 - TINTED) * its)
+            for own, its in zip(self.tint, part, strict=True)
+        )
+        return red, green, blue
+
+    def line(self, name: str) -> str:
+        """Return what a line of a plot is called in this run."""
+        return f"{self.label}: {name}" if self.label else name
+
+
+def looks(labels: list[str]) -> list[Look]:
+    """Return the looks of runs that are shown together, by what each is called."""
+    if len(labels) == 1:
+        return [Look()]
+    return [Look(f"run_{i + 1}/", label, TINTS[i % len(TINTS)]) for i, label in enumerate(labels)]

@@ -1,0 +1,113 @@
+"""Where everything of a run is in the rows of its record that are drawn."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from fivebar_sim.arrays import Array
+from fivebar_sim.geometry import FiveBar
+from fivebar_sim.kinematics import bases, chain_points
+
+Rows = NDArray[np.intp]
+
+POSE_PERIOD = 0.01
+"""Time between two drawn poses [s]: 100 Hz looks like every step, at a fraction of the size."""
+
+
+class Motion(NamedTuple):
+    """The rows that are drawn; lengths in m, angles in rad, forces in N.
+
+    Attributes:
+        q: (theta_A, theta_B, theta_E, theta_D), (n, 4).
+        foot: F in the hip frame, (n, 2).
+        target: Where F should be, hip frame, (n, 2).
+        hip: The hip above the floor, (n,); None where there is no floor.
+        force: Of the ground on the foot, (n, 2); None where there is no ground.
+        belt: How far the belt has run, (n,); None where the floor stands still.
+    """
+
+    q: Array
+    foot: Array
+    target: Array
+    hip: Array | None = None
+    force: Array | None = None
+    belt: Array | None = None
+
+    @property
+    def world_foot(self) -> Array:
+        """F above the floor, (n, 2); without a floor that in the hip frame."""
+        return self.foot if self.hip is None else self.foot + in_height(self.hip)
+
+
+def motion(record: Mapping[str, Array], rows: Rows) -> Motion:
+    """Return some rows of a record."""
+    return Motion(
+        q=np.stack([record[f"theta_{joint}"][rows] for joint in "ABED"], axis=-1),
+        foot=points(record, "foot")[rows],
+        target=points(record, "target")[rows],
+        hip=record["hip_z"][rows] if "hip_z" in record else None,
+        force=points(record, "ground")[rows] if "ground_z" in record else None,
+        belt=record["belt_x"][rows] if "belt_x" in record else None,
+    )
+
+
+def timestep(time: Array) -> float:
+    """Return h [s] of the times h, 2 h, ... N h."""
+    return float(time[-1]) / len(time)
+
+
+def drawn_rows(time: Array) -> Rows:
+    """Return the rows whose poses are drawn: the first, one every `POSE_PERIOD`, and the last."""
+    every = max(1, round(POSE_PERIOD / timestep(time)))
+    return np.union1d(np.arange(0, len(time), every), len(time) - 1)
+
+
+def points(record: Mapping[str, Array], name: str) -> Array:
+    """Return the points (x, z) of two columns, (N, 2)."""
+    return np.stack([record[f"{name}_x"], record[f"{name}_z"]], axis=-1)
+
+
+def in_height(z: ArrayLike) -> Array:
+    """Return heights z as points (0, z), (...) to (..., 2)."""
+    height = np.asarray(z, dtype=np.float64)
+    return np.stack([np.zeros_like(height), height], axis=-1)
+
+
+class Stage(NamedTuple):
+    """The room that all runs of a recording need together; the floor is the plane z = 0.
+
+    Attributes:
+        low: The lowest (x, z) [m] that a leg comes to, and the floor's height where there is one.
+        high: The highest (x, z) [m].
+        size: Of the largest leg [m].
+        metre_per_newton: Length of a force's arrow: that of the largest is half of size.
+        floor: Whether there is one.
+    """
+
+    low: Array
+    high: Array
+    size: float
+    metre_per_newton: float
+    floor: bool
+
+
+def stage(legs: Sequence[FiveBar], moved: Sequence[Motion]) -> Stage:
+    """Return the room that legs and their motions need."""
+    places = np.concatenate([_places(leg, each) for leg, each in zip(legs, moved, strict=True)])
+    forces = [np.hypot(*each.force.T).max() for each in moved if each.force is not None]
+    floor = any(each.hip is not None for each in moved)
+    if floor:
+        places = np.concatenate([places, np.zeros((1, 2))])
+    size, largest = max(leg.size for leg in legs), float(max(forces, default=0.0))
+    scale = 0.5 * size / largest if largest > 0.0 else 0.0
+    return Stage(places.min(axis=0), places.max(axis=0), size, scale, floor)
+
+
+def _places(leg: FiveBar, moved: Motion) -> Array:
+    """Return everywhere that the joints of a leg come to [m], (..., 2)."""
+    hip = in_height(np.zeros(len(moved.q)) if moved.hip is None else moved.hip)
+    return np.concatenate([hip + p for p in (*bases(leg), *chain_points(leg, moved.q))])

@@ -1,0 +1,83 @@
+"""The text of a recording: the verdict of each run, its limits, and all metrics side by side."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+from fivebar_sim.console import SHOWN, bounds, shown
+from fivebar_sim.metrics import Limit, judge, look_up
+
+
+def summary(
+    labels: Sequence[str],
+    metrics: Sequence[Mapping[str, Any]],
+    limits: Sequence[Mapping[str, tuple[float, float]]],
+) -> str:
+    """Return Markdown: of every run the verdict, and each limit with its value; then the metrics.
+
+    Args:
+        labels: What each run is called.
+        metrics: What metrics.json says of each.
+        limits: (low, high) of each by the metric's dotted key.
+    """
+    lines: list[str] = []
+    for label, measured, own in zip(labels, metrics, limits, strict=True):
+        lines += [f"## {_cell(label)}: {measured['verdict'].upper()}", ""]
+        lines += [*_limits(_judged(measured, own)), ""]
+    names = [_cell(label) for label in labels] if len(labels) > 1 else ["value"]
+    lines += [f"| metric | {' | '.join(names)} |", f"|:--|{'--:|' * len(names)}"]
+    for key, (name, _, _) in SHOWN.items():
+        values = [_value(measured, key) for measured in metrics]
+        if any(values):
+            lines.append(f"| {name} | {' | '.join(values)} |")
+    for label, measured in zip(labels, metrics, strict=True):
+        facts = ", ".join(
+            f"{key} {_cell(value)}" for key, value in _flat(measured.get("provenance", {}))
+        )
+        lines += ["", f"*{_cell(label)}: {facts}*"]
+    return "\n".join(lines) + "\n"
+
+
+def _judged(measured: Mapping[str, Any], limits: Mapping[str, tuple[float, float]]) -> list[Limit]:
+    """Return every limit with its value; one on what was not measured is broken."""
+    known = {key: limit for key, limit in limits.items() if _value(measured, key)}
+    return [
+        *judge(measured, known),
+        *(Limit(key, *limits[key], None, False) for key in limits if key not in known),
+    ]
+
+
+def _limits(judged: Sequence[Limit]) -> Iterator[str]:
+    """Yield a table of limits, each with its value."""
+    if not judged:
+        yield "No limits set."
+        return
+    yield "| limit | allowed | value | verdict |"
+    yield "|:--|--:|--:|:--|"
+    for limit in judged:
+        verdict = "pass" if limit.ok else "**FAIL**"
+        name, value = SHOWN[limit.key][0], shown(limit.key, limit.value)
+        yield f"| {name} | {bounds(limit)} | {value} | {verdict} |"
+
+
+def _value(measured: Mapping[str, Any], key: str) -> str:
+    """Return a metric as people read it, "" where the run has none of it."""
+    try:
+        return shown(key, look_up(measured, key))
+    except KeyError:
+        return ""
+
+
+def _flat(table: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
+    """Yield the values of nested tables by dotted keys."""
+    for key, value in table.items():
+        if isinstance(value, Mapping):
+            yield from _flat(value, f"{prefix}{key}.")
+        else:
+            yield f"{prefix}{key}", value
+
+
+def _cell(value: Any) -> str:
+    """Return a value for one cell of a Markdown table."""
+    return " ".join(str(value).replace("|", "\\|").split())

@@ -1,0 +1,198 @@
+"""A recording in the browser: one HTTP server on the loopback with a fixed table of pages.
+
+Rerun's own page looks for fonts and news on other hosts; this one does not, and its policy
+forbids the viewer to.
+"""
+
+from __future__ import annotations
+
+import socketserver
+from collections.abc import Mapping
+from html import escape
+from http import HTTPStatus
+from http.server import BaseHTTPRequestHandler
+from pathlib import Path
+from typing import NamedTuple
+
+from fivebar_sim.checks import check_number
+from fivebar_sim.errors import ConfigError
+from fivebar_sim.recording_viewer import LOOPBACK, web_files
+
+POLICY = "; ".join(
+    (
+        "default-src 'none'",
+        "script-src 'self' 'wasm-unsafe-eval'",
+        "style-src 'self'",
+        "img-src 'self'",
+        "connect-src 'self'",
+        "base-uri 'none'",
+        "form-action 'none'",
+        "frame-ancestors 'none'",
+    )
+)
+"""The Content-Security-Policy: nothing is loaded from, or sent to, any other host."""
+
+HEADERS = {
+    "Content-Security-Policy": POLICY,
+    "X-Content-Type-Options": "nosniff",
+    "Referrer-Policy": "no-referrer",
+    "Cross-Origin-Resource-Policy": "same-origin",
+    "Cache-Control": "no-store",
+}
+
+PAGE = """<!doctype html>
+<html lang="en">
+<head>
+<meta charset="utf-8">
+<title>{title}</title>
+<link rel="icon" href="/favicon.ico">
+<link rel="stylesheet" href="/page.css">
+</head>
+<body>
+<p id="status">Loading the viewer ...</p>
+<canvas id="the_canvas_id"></canvas>
+<script src="/re_viewer.js"></script>
+<script src="/page.js"></script>
+</body>
+</html>
+"""
+
+STYLE = """
+html, body { margin: 0; height: 100%; overflow: hidden; background: #0d1011; }
+p { position: absolute; top: 50%; width: 100%; text-align: center; color: #cad8de; }
+canvas { position: absolute; top: 0; left: 0; width: 100%; height: 100%; visibility: hidden; }
+canvas.visible { visibility: visible; }
+"""
+
+SCRIPT = """
+"use strict";
+const say = (text) => { document.getElementById("status").textContent = text; };
+async function start() {
+  const canvas = document.getElementById("the_canvas_id");
+  await wasm_bindgen({ module_or_path: "/re_viewer_bg.wasm" });
+  const viewer = new wasm_bindgen.WebHandle({
+    url: [new URL("/recording.rrd", location.href).href],
+    hide_welcome_screen: true,
+    enable_history: false,
+    persist: false,
+  });
+  await viewer.start(canvas);
+  canvas.classList.add("visible");
+  say("");
+  setInterval(() => {
+    if (viewer.has_panicked()) {
+      canvas.classList.remove("visible");
+      say("The viewer has crashed: " + viewer.panic_message());
+    }
+  }, 1000);
+}
+start().catch((error) => say("The viewer did not start: " + error));
+"""
+
+
+class Page(NamedTuple):
+    """What is served at a path: its media type and its bytes."""
+
+    kind: str
+    body: bytes
+
+
+class Server(socketserver.ThreadingTCPServer):
+    """Serves a table of pages to browsers on this machine.
+
+    Attributes:
+        pages: By path; nothing else is served.
+    """
+
+    allow_reuse_address = True
+    daemon_threads = True
+
+    def __init__(self, port: int) -> None:
+        """Take a port, 0 for a free one.
+
+        Raises:
+            ArgumentError: Unless 0 <= port <= 65535.
+            ConfigError: The port is taken, or not for us.
+        """
+        check_number("--port", port, "", low=0, high=65535)
+        self.pages: Mapping[str, Page] = {}
+        try:
+            super().__init__((LOOPBACK, port), Handler)
+        except OSError as error:
+            raise ConfigError(f"--port must be free, got {port}: {error.strerror}") from None
+
+    @property
+    def port(self) -> int:
+        """The port that it is at."""
+        return self.server_address[1]
+
+    @property
+    def url(self) -> str:
+        """The address for a browser."""
+        return f"http://{LOOPBACK}:{self.port}/"
+
+    @property
+    def hosts(self) -> tuple[str, str]:
+        """The names by which it may be called: any other is a foreign page's, aimed at this one."""
+        return f"{LOOPBACK}:{self.port}", f"localhost:{self.port}"
+
+
+class Handler(BaseHTTPRequestHandler):
+    """Answers GET and HEAD for the paths of the table, asked by a loopback name."""
+
+    server: Server  # pyright: ignore[reportIncompatibleVariableOverride]
+    server_version, sys_version = "fivebar", ""
+    timeout = 30.0
+
+    def do_GET(self) -> None:
+        """Send a page."""
+        page = self._page()
+        if page:
+            self.wfile.write(page.body)
+
+    def do_HEAD(self) -> None:
+        """Send a page's headers."""
+        self._page()
+
+    def _page(self) -> Page | None:
+        """Send the headers of the page that is asked for and return it, or send an error."""
+        page = self.server.pages.get(self.path.partition("?")[0])
+        if self.headers.get_all("Host", []) not in [[host] for host in self.server.hosts]:
+            self.send_error(HTTPStatus.FORBIDDEN)
+        elif page is None:
+            self.send_error(HTTPStatus.NOT_FOUND)
+        else:
+            self.send_response(HTTPStatus.OK)
+            self.send_header("Content-Type", page.kind)
+            self.send_header("Content-Length", str(len(page.body)))
+            self.end_headers()
+            return page
+        return None
+
+    def end_headers(self) -> None:
+        """Send the headers that every answer has."""
+        for name, value in HEADERS.items():
+            self.send_header(name, value)
+        super().end_headers()
+
+    def log_message(self, format: str, *args: object) -> None:
+        """Say nothing: the terminal is the user's."""
+
+
+def pages(recording: Path, title: str) -> dict[str, Page]:
+    """Return what is served of a recording: a page of this title, the viewer, and the recording.
+
+    Raises:
+        ViewerMissingError: The installed Rerun gives no web viewer.
+        OSError: The recording cannot be read.
+    """
+    viewer = web_files()
+    return {
+        "/": Page("text/html; charset=utf-8", PAGE.format(title=escape(title)).encode()),
+        "/page.css": Page("text/css; charset=utf-8", STYLE.encode()),
+        "/page.js": Page("text/javascript; charset=utf-8", SCRIPT.encode()),
+        "/re_viewer.js": Page("text/javascript; charset=utf-8", viewer["re_viewer.js"]),
+        "/re_viewer_bg.wasm": Page("application/wasm", viewer["re_viewer_bg.wasm"]),
+        "/favicon.ico": Page("image/x-icon", viewer["favicon.ico"]),
+        "/recording.rrd": Page("application/octet-stream", recording.read_bytes()),
+    }

@@ -1,0 +1,59 @@
+"""The text of a recording: verdicts, limits with their values, metrics side by side."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+from recorded import LEG, METRICS, ellipse, read, written
+
+from fivebar_sim.recording_summary import summary
+from fivebar_sim.scenario import Scenario
+
+LIMITS = {"tracking.rms": (-math.inf, 1e-3), "closure.max": (0.0, 1e-6), "load.share_A": (0.4, 0.6)}
+
+
+def test_one_run_has_its_limits_its_metrics_and_its_provenance() -> None:
+    assert summary(["trot"], [METRICS], [LIMITS]).splitlines() == [
+        "## trot: FAIL",
+        "",
+        "| limit | allowed | value | verdict |",
+        "|:--|--:|--:|:--|",
+        "| tracking RMS | <= 1 mm | 0.1235 mm | pass |",
+        "| loop gap max | 0 to 1 um | 3 um | **FAIL** |",
+        "| load share A | 40 to 60 % | undefined | **FAIL** |",
+        "",
+        "| metric | value |",
+        "|:--|--:|",
+        "| tracking RMS | 0.1235 mm |",
+        "| tracking max | 0.3 mm |",
+        "| loop gap RMS | 0.1 um |",
+        "| loop gap max | 3 um |",
+        "| load share A | undefined |",
+        "| branch flips | 0 |",
+        "| MuJoCo warnings | 0 |",
+        "",
+        "*trot: versions.mujoco 3.17, seed 0*",
+    ]
+
+
+def test_several_runs_stand_side_by_side() -> None:
+    calm = METRICS | {"verdict": "pass", "ground": {"slip": 1e-3}, "closure": {"max": 1e-6}}
+    lines = summary(["a | b\n", "calm"], [METRICS, calm], [{}, LIMITS]).splitlines()
+    assert lines[:3] == ["## a \\| b: FAIL", "", "No limits set."]
+    assert "## calm: PASS" in lines
+    assert "| metric | a \\| b | calm |" in lines
+    assert "| loop gap RMS | 0.1 um |  |" in lines
+    assert "| slip in stance |  | 1 mm |" in lines
+
+
+def test_it_is_in_the_recording(tmp_path: Path) -> None:
+    _, static = read(written(tmp_path / "a.rrd", LEG, ellipse(LEG, 5)))
+    limits = Scenario.load("classic-ellipse").limits
+    text = summary(["round and round"], [METRICS], [limits])
+    assert static["/summary"]["TextDocument:text"] == [[text]]
+
+
+def test_limit_on_what_was_not_measured_is_broken() -> None:
+    text = summary(["old"], [{"verdict": "pass"}], [LIMITS])
+    assert text.count("| undefined | **FAIL** |") == 3
