@@ -15,12 +15,23 @@ import tyro
 from fivebar_sim import __version__
 from fivebar_sim.commands.check import check
 from fivebar_sim.commands.common import FAILED, INTERRUPTED, UNREAD, WRONG, say
+from fivebar_sim.commands.render import render
 from fivebar_sim.commands.replay import replay
+from fivebar_sim.commands.report import report
 from fivebar_sim.commands.run import run
+from fivebar_sim.commands.view import view
 from fivebar_sim.commands.workspace import workspace
 from fivebar_sim.errors import DivergedError, FiveBarError
 
-COMMANDS = {"run": run, "check": check, "replay": replay, "workspace": workspace}
+COMMANDS = {
+    "run": run,
+    "check": check,
+    "replay": replay,
+    "report": report,
+    "render": render,
+    "view": view,
+    "workspace": workspace,
+}
 
 
 def main(argv: Sequence[str] | None = None) -> int:

@@ -1,0 +1,53 @@
+"""`fivebar render`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+from tyro.conf import Positional, arg
+
+from fivebar_sim.commands.common import working
+
+
+def render(
+    run_dir: Positional[Annotated[Path, arg(metavar="RUN_DIR")]],
+    /,
+    *,
+    out: Annotated[str | None, arg(metavar="FILE")] = None,
+    fps: float = 30.0,
+    speed: float = 1.0,
+    width: int = 640,
+    height: int = 480,
+    at: Annotated[float | None, arg(metavar="SECONDS")] = None,
+) -> int:
+    """Draw a run: the leg, its target path, the foot's trail and the ground's force.
+
+    A .gif shows the last whole period of a periodic path and starts over without a jump; a .mp4
+    (by the program ffmpeg) shows all of the run; a .png one moment.
+
+    Args:
+        run_dir: A run directory that `fivebar run` wrote.
+        out: The picture, .gif, .mp4 or .png (default NAME.gif).
+        fps: Frames a second.
+        speed: Of the run's time over the clock's; 0.25 is four times slower than real time.
+        width: Of the picture [pixels].
+        height: Of the picture [pixels].
+        at: Moment of a .png [s] (default: the middle of the run).
+    """
+    from fivebar_sim import gl, stored_run
+
+    run = stored_run.read(run_dir)
+    gl.find()  # before mujoco is imported, which fails where MUJOCO_GL names what is not there
+
+    from fivebar_sim import render
+    from fivebar_sim.render_replay import replay
+
+    place = Path(f"{run.scenario.name}.gif" if out is None else out)
+    film = render.Film(width, height, fps, speed, at)
+    with working(f"drawing {place}", quiet=False):
+        frames = render.write(replay(run.scenario, run.record), place, film)
+    size = place.stat().st_size / 1e3
+    what = "1 frame" if frames == 1 else f"{frames} frames"
+    print(f"drew {what} of {run.scenario.name} into {place}: {size:.0f} kB")  # noqa: T201
+    return 0

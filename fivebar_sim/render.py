@@ -1,0 +1,189 @@
+"""A run as a GIF, a film or a picture, by MuJoCo's own renderer, with or without a screen.
+
+The record's qpos is shown, through `mj_forward`; nothing is simulated again.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import NamedTuple
+
+import mujoco
+import numpy as np
+
+from fivebar_sim import gl, render_files, render_scene
+from fivebar_sim.checks import check_number
+from fivebar_sim.errors import ConfigError
+from fivebar_sim.render_files import Frame
+from fivebar_sim.render_replay import Replay, Span
+
+FORMATS = (".gif", ".mp4", ".png")
+FASTEST = {".gif": 50.0, ".mp4": 240.0, ".png": 240.0}
+"""Most frames a second; viewers slow a GIF down that has more [1/s]."""
+LEAST, MOST = 64, 4096
+"""Pixels along a side."""
+MOST_GIF, MOST_FRAMES = 250_000_000, 100_000
+"""Pixels of all of a GIF's frames, which are held in memory; frames of a film, which are not."""
+SAMPLES = 8
+"""Frames that a GIF's palette is made for."""
+
+
+class Film(NamedTuple):
+    """How a run is shown.
+
+    Attributes:
+        width: Of the picture [pixels].
+        height: [pixels].
+        fps: Frames a second.
+        speed: Of the run's time over the clock's; 1 is real time.
+        at: Moment of a single picture [s]; None is the middle of the run.
+    """
+
+    width: int = 640
+    height: int = 480
+    fps: float = 30.0
+    speed: float = 1.0
+    at: float | None = None
+
+
+def span(replay: Replay, suffix: str) -> Span:
+    """Return the part of a run that a kind of file shows.
+
+    A GIF shows the last whole period of a periodic path, so that it starts over without a jump;
+    a film shows all of the run, as does the GIF of another path.
+    """
+    return replay.cycle if suffix == ".gif" else replay.whole
+
+
+def moments(part: Span, film: Film) -> list[float]:
+    """Return the times of the frames [s], evenly spaced from the start, without the end.
+
+    There are length fps / speed of them, rounded, and one at least.
+    """
+    count = max(1, round(part.length * film.fps / film.speed))
+    return [part.start + part.length * k / count for k in range(count)]
+
+
+def check(replay: Replay, out: Path, film: Film) -> None:
+    """Raise unless a run can be shown like this.
+
+    Raises:
+        ConfigError: An unknown kind of file, or a number out of its range.
+    """
+    kind = out.suffix.lower()
+    if kind not in FORMATS:
+        raise ConfigError(f"cannot draw {out}: the picture must end in {', '.join(FORMATS)}")
+    check_number("fps", film.fps, "1/s", low=0.1, high=FASTEST[kind], error=ConfigError)
+    check_number("speed", film.speed, "", low=1e-4, high=1e4, error=ConfigError)
+    for name in ("width", "height"):
+        pixels = getattr(film, name)
+        check_number(name, pixels, "pixels", low=LEAST, high=MOST, error=ConfigError)
+        if kind == ".mp4" and pixels % 2:
+            raise ConfigError(f"{name} of a .mp4 must be even, got {pixels}")
+    if film.at is not None:
+        if kind != ".png":
+            raise ConfigError(f"at is the moment of a .png, and {out} is none")
+        check_number("at", film.at, "s", low=0.0, high=replay.duration, error=ConfigError)
+    wanted = span(replay, kind).length * film.fps / film.speed
+    most = MOST_GIF // (film.width * film.height) if kind == ".gif" else MOST_FRAMES
+    if kind != ".png" and not wanted <= most:
+        raise ConfigError(
+            f"a {kind} of {film.width} x {film.height} may have up to {most} frames, got "
+            f"{wanted:.0f}: take fewer a second, a higher speed or another kind of file"
+        )
+
+
+def write(replay: Replay, out: Path, film: Film) -> int:
+    """Draw a run into a file, written beside and renamed; return the number of frames.
+
+    Args:
+        replay: The run.
+        out: The file; .gif, .mp4 or .png.
+        film: How it is shown.
+
+    Raises:
+        ConfigError: What `check` refuses, no GL or no ffmpeg here, or a file that cannot be
+            written.
+    """
+    check(replay, out, film)
+    kind = out.suffix.lower()
+    part = span(replay, kind)
+    times = moments(part, film)
+    if kind == ".png":
+        times = [0.5 * replay.duration if film.at is None else film.at]
+    with render_files.beside(out) as place, stage(replay, film.width, film.height) as drawn:
+        frames = (drawn.frame(time) for time in times)
+        if kind == ".png":
+            render_files.write_png(place, next(frames))
+        elif kind == ".mp4":
+            render_files.write_mp4(place, frames, film.fps)
+        else:
+            sample = (drawn.frame(time) for time in times[:: -(-len(times) // SAMPLES)])
+            shown = render_files.durations(len(times), part.length / film.speed)
+            render_files.write_gif(place, frames, sample, shown)
+    return len(times)
+
+
+class Stage:
+    """Where a run is drawn: a GL context, the scene and its camera.
+
+    Args:
+        replay: The run.
+        width: Of the picture [pixels].
+        height: [pixels].
+    """
+
+    def __init__(self, replay: Replay, width: int, height: int) -> None:
+        self.camera = render_scene.fit(replay, width / height)
+        self._replay, self._rect = replay, mujoco.MjrRect(0, 0, width, height)
+        render_scene.dress(replay, self.camera, max(width, height))
+        model = replay.model
+        model.vis.global_.offwidth, model.vis.global_.offheight = width, height
+        self._data = mujoco.MjData(model)
+        self.scene = mujoco.MjvScene(model, render_scene.GEOMS)
+        self._option, self._view = mujoco.MjvOption(), mujoco.MjvCamera()
+        self.camera.aim(self._view)
+        self._gl = gl.context(gl.find(), width, height)
+        try:
+            self._gl.make_current()
+            self._mjr = mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_100)
+        except mujoco.FatalError as error:
+            self._gl.free()
+            raise ConfigError(f"cannot draw {width} x {height} pixels here: {error}") from None
+        mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN, self._mjr)
+
+    def frame(self, time: float) -> Frame:
+        """Return the picture of a moment of the run [s], (height, width, 3)."""
+        row = self._replay.row(time)
+        model, data = self._replay.model, self._data
+        data.qpos[:] = self._replay.qpos[row]
+        mujoco.mj_forward(model, data)
+        every = mujoco.mjtCatBit.mjCAT_ALL
+        mujoco.mjv_updateScene(model, data, self._option, None, self._view, every, self.scene)
+        render_scene.decorate(self.scene, self._replay, row, self.camera.eye)
+        self._gl.make_current()
+        mujoco.mjr_render(self._rect, self.scene, self._mjr)
+        pixels = np.empty((self._rect.height, self._rect.width, 3), np.uint8)
+        mujoco.mjr_readPixels(pixels, None, self._rect, self._mjr)
+        return np.ascontiguousarray(pixels[::-1])  # GL's rows go up
+
+    def close(self) -> None:
+        """Let go of the GL context."""
+        self._mjr.free()
+        self._gl.free()
+
+
+@contextmanager
+def stage(replay: Replay, width: int, height: int) -> Iterator[Stage]:
+    """Give a stage, closed at the end.
+
+    Raises:
+        ConfigError: There is no GL here.
+    """
+    opened = Stage(replay, width, height)
+    try:
+        yield opened
+    finally:
+        opened.close()

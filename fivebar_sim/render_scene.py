@@ -1,0 +1,259 @@
+"""What is drawn of a run: the leg, its target path, the foot's trail, the force of the ground.
+
+The hip frame's (x, z) is the world's (x, 0, z) over the hip; the camera looks along +y. Lines and
+marks are moved towards the eye, along their rays: they hide the links and stay in place.
+"""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import NamedTuple
+
+import mujoco
+import numpy as np
+from numpy.typing import ArrayLike
+
+from fivebar_sim import kinematics
+from fivebar_sim.arrays import Array
+from fivebar_sim.render_replay import Replay
+
+FIELD, DOWN = 20.0, 9.0
+"""Of the camera: vertical field of view, and how far it looks down [degrees]."""
+MARGIN = 1.08
+"""The picture's size over that of the motion."""
+TRAIL_SECONDS = 0.5
+"""How long the trail of the foot stays [s]; never all of a period, or it would hide the path."""
+PATH_PARTS, TRAIL_PARTS = 160, 60
+SLATS = 8
+"""Marks on a belt to either side of the leg."""
+GEOMS = 2000
+"""Room of a scene."""
+
+Colour = tuple[float, float, float]
+GREEN, RED, PALE = (0.12, 0.60, 0.30), (0.84, 0.16, 0.24), (0.93, 0.78, 0.80)
+VIOLET, SLAT, PIN = (0.45, 0.15, 0.70), (0.50, 0.53, 0.57), (0.90, 0.91, 0.93)
+
+
+class Camera(NamedTuple):
+    """Where the picture is taken from.
+
+    Attributes:
+        centre: What it looks at [m], (3,).
+        distance: From there [m].
+        field: Vertical field of view [degrees].
+    """
+
+    centre: Array
+    distance: float
+    field: float
+
+    @property
+    def forward(self) -> Array:
+        """Unit vector of its view, (3,)."""
+        return np.array([0.0, np.cos(np.radians(DOWN)), -np.sin(np.radians(DOWN))])
+
+    @property
+    def eye(self) -> Array:
+        """Where it is [m], (3,)."""
+        return self.centre - self.distance * self.forward
+
+    def aim(self, camera: mujoco.MjvCamera) -> None:
+        """Set a free camera of MuJoCo; its field of view is the model's."""
+        camera.type = mujoco.mjtCamera.mjCAMERA_FREE
+        camera.lookat[:] = self.centre
+        camera.distance, camera.azimuth, camera.elevation = self.distance, 90.0, -DOWN
+
+
+def fit(replay: Replay, aspect: float) -> Camera:
+    """Return the camera that sees the whole motion.
+
+    A point p (about the centre) is in the picture if |p . right| <= (d + p . forward) tan(h / 2),
+    h the horizontal field, and likewise up: d is the least distance at which all are.
+
+    Args:
+        replay: The run.
+        aspect: Width over height of the picture.
+    """
+    leg, seen = replay.scenario.leg, replay.fitted()
+    points = np.stack([seen[:, 0], np.zeros(len(seen)), seen[:, 1]], axis=-1)
+    probe = Camera(np.zeros(3), 1.0, FIELD)
+    right = np.array([1.0, 0.0, 0.0])
+    up = np.cross(right, probe.forward)
+    pad = leg.foot_radius + 2.0 * leg.radius
+    middle = [0.5 * float((points @ n).min() + (points @ n).max()) for n in (right, up)]
+    centre = middle[0] * right + middle[1] * up
+    depth = points @ probe.forward
+    tangent = np.tan(np.radians(0.5 * FIELD)) / MARGIN
+    needed = [
+        (np.abs((points - centre) @ n) + pad) / t - depth
+        for n, t in ((right, tangent * aspect), (up, tangent))
+    ]
+    return Camera(centre, float(np.max(needed)), FIELD)
+
+
+def dress(replay: Replay, camera: Camera, pixels: int = 1024) -> None:
+    """Set what the file's model leaves to the picture: field of view, clipping, floor, shadows.
+
+    Args:
+        replay: The run; its model is changed.
+        camera: That it is seen by.
+        pixels: Of the picture's longer side.
+    """
+    model = replay.model
+    size = camera.distance * np.tan(np.radians(camera.field))
+    model.vis.global_.fovy = camera.field
+    model.stat.center[:] = camera.centre
+    model.stat.extent = size
+    model.vis.map.znear, model.vis.map.zfar = 0.1, 60.0
+    model.vis.quality.shadowsize = 2 * pixels
+    floor = model.geom("floor")
+    floor.size[:2] = 0.0  # without end
+    material = model.mat(int(floor.matid[0]))
+    material.texuniform[:] = 1
+    material.texrepeat[:] = 0.5 / _square(replay)
+    material.reflectance[:] = 0.0
+    if not replay.ground.any():  # that of a leg in the air falls out of the picture's lower edge
+        model.light_castshadow[:] = 0
+
+
+def _square(replay: Replay) -> float:
+    """Return the side of the floor's squares [m]: 1, 2 or 5 of a decade, a quarter leg or less."""
+    wanted = 0.25 * replay.scenario.leg.size
+    decade = 10.0 ** np.floor(np.log10(wanted))
+    return float(decade * max(n for n in (1.0, 2.0, 5.0) if n * decade <= wanted))
+
+
+def decorate(scene: mujoco.MjvScene, replay: Replay, row: int, eye: Array) -> None:
+    """Add the target path, the trail, target, ground force and belt of a row to a scene.
+
+    Args:
+        scene: With room for them.
+        replay: The run.
+        row: Of the record.
+        eye: From where they must be seen [m], (3,).
+    """
+    leg = replay.scenario.leg
+    hip = np.array([0.0, replay.hip[row]])
+    pen = _Pen(scene, eye, 1.6 * leg.foot_radius + leg.radius)
+    _pins(pen, replay, row, hip)
+    path = pen.before(_path(replay) + hip)  # the trail is thinner at its end, thicker at the foot
+    for start, end in pairwise(path):
+        pen.bar(start, end, 0.15 * leg.foot_radius, GREEN)
+    trail = pen.before(_trail(replay, row) + hip)
+    for k, (start, end) in enumerate(pairwise(trail)):
+        part = (k + 1) / TRAIL_PARTS
+        width = (0.08 + 0.24 * part) * leg.foot_radius
+        pen.bar(start, end, width, _mix(PALE, RED, part))
+    pen.ball(pen.before(replay.target[row] + hip), 0.5 * leg.foot_radius, GREEN)
+    _force(pen, replay, row, hip)
+    if replay.belt is not None:
+        _belt(pen, replay, row)
+
+
+def _path(replay: Replay) -> Array:
+    """Return the targets of one period, or of the whole run [m], (n, 2)."""
+    start, length = replay.cycle
+    times = start + length * np.linspace(0.0, 1.0, PATH_PARTS + 1)
+    return replay.target[[replay.row(time) for time in times]]
+
+
+def _trail(replay: Replay, row: int) -> Array:
+    """Return where the foot was until a row, from the oldest on [m], (n, 2)."""
+    seconds = min(TRAIL_SECONDS, 0.8 * (replay.scenario.path.period or np.inf))
+    back = seconds / replay.scenario.sim.timestep * np.linspace(1.0, 0.0, TRAIL_PARTS + 1)
+    return replay.foot[np.maximum(row - np.round(back).astype(int), 0)]
+
+
+def _pins(pen: _Pen, replay: Replay, row: int, hip: Array) -> None:
+    """Draw the pins of the joints A, E, B and D."""
+    leg = replay.scenario.leg
+    points = kinematics.chain_points(leg, replay.qpos[row, -4:])
+    for joint in (*kinematics.bases(leg), points.B, points.D):
+        pen.pin(pen.before(joint + hip), 0.5 * leg.radius, PIN)
+
+
+def _force(pen: _Pen, replay: Replay, row: int, hip: Array) -> None:
+    """Draw the ground's force on the foot; the largest of the run is as long as the leg."""
+    leg, force = replay.scenario.leg, replay.ground[row]
+    largest = float(np.hypot(*replay.ground.T).max())
+    if np.hypot(*force) > 0.01 * largest:
+        start = replay.foot[row] + hip - (0.0, leg.foot_radius)
+        tip = start + leg.size * force / largest
+        pen.arrow(pen.before(start, 2.0), pen.before(tip, 2.0), 0.45 * leg.foot_radius, VIOLET)
+
+
+def _belt(pen: _Pen, replay: Replay, row: int) -> None:
+    """Draw marks on the belt that run with it, a whole number of them a period."""
+    assert replay.belt is not None
+    size, period = replay.scenario.leg.size, replay.scenario.path.period
+    speed = abs(float(replay.belt[-1])) / replay.duration
+    gap = 0.3 * size
+    if period is not None and speed > 0.0:
+        gap = speed * period / max(1, round(speed * period / gap))
+    shift = float(np.mod(replay.belt[row], gap))
+    for k in range(-SLATS, SLATS + 1):
+        x = shift + k * gap
+        pen.bar((x, -0.8 * size, 0.0), (x, 0.8 * size, 0.0), 0.004 * size, SLAT)
+
+
+def _mix(first: Colour, second: Colour, part: float) -> Colour:
+    """Return the colour that lies a part of the way from the first to the second."""
+    r, g, b = ((1.0 - part) * a + part * z for a, z in zip(first, second, strict=True))
+    return r, g, b
+
+
+class _Pen:
+    """Adds geoms to a scene.
+
+    Args:
+        scene: That they are added to.
+        eye: [m], (3,).
+        front: How far things are moved towards the eye [m].
+    """
+
+    def __init__(self, scene: mujoco.MjvScene, eye: Array, front: float) -> None:
+        self._scene, self._eye, self._front = scene, eye, front
+
+    def before(self, points: Array, times: float = 1.0) -> Array:
+        """Return points (x, z) of the leg plane in front of it, (..., 2) to (..., 3)."""
+        space = np.stack([points[..., 0], np.zeros(points.shape[:-1]), points[..., 1]], axis=-1)
+        ray = self._eye - space
+        return space + times * self._front * ray / np.linalg.norm(ray, axis=-1, keepdims=True)
+
+    def bar(self, start: ArrayLike, end: ArrayLike, radius: float, colour: Colour) -> None:
+        """Add a capsule."""
+        self._connect(mujoco.mjtGeom.mjGEOM_CAPSULE, start, end, radius, colour)
+
+    def arrow(self, start: ArrayLike, end: ArrayLike, radius: float, colour: Colour) -> None:
+        """Add an arrow."""
+        self._connect(mujoco.mjtGeom.mjGEOM_ARROW, start, end, radius, colour)
+
+    def ball(self, centre: Array, radius: float, colour: Colour) -> None:
+        """Add a sphere."""
+        geom = self._new(mujoco.mjtGeom.mjGEOM_SPHERE, colour)
+        geom.size[:], geom.pos[:] = radius, centre
+
+    def pin(self, centre: Array, radius: float, colour: Colour) -> None:
+        """Add a disc that faces +-y."""
+        across = np.array([0.0, 0.1 * radius, 0.0])
+        kind = mujoco.mjtGeom.mjGEOM_CYLINDER
+        self._connect(kind, centre - across, centre + across, radius, colour)
+
+    def _connect(
+        self, kind: int, start: ArrayLike, end: ArrayLike, radius: float, colour: Colour
+    ) -> None:
+        mujoco.mjv_connector(self._new(kind, colour), kind, radius, _point(start), _point(end))
+
+    def _new(self, kind: int, colour: Colour) -> mujoco.MjvGeom:
+        """Return the scene's next geom."""
+        geom = self._scene.geoms[self._scene.ngeom]
+        rgba = np.array([*colour, 1.0], np.float32)
+        mujoco.mjv_initGeom(geom, kind, np.ones(3), np.zeros(3), np.eye(3).ravel(), rgba)
+        geom.category = mujoco.mjtCatBit.mjCAT_DECOR
+        geom.emission, geom.specular = 0.15, 0.0
+        self._scene.ngeom += 1
+        return geom
+
+
+def _point(point: ArrayLike) -> Array:
+    return np.asarray(point, dtype=np.float64)

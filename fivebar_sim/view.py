@@ -1,0 +1,157 @@
+"""MuJoCo's interactive viewer: a run in real time, or a leg to move by its sliders."""
+
+from __future__ import annotations
+
+import math
+import os
+import sys
+import time
+import warnings
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import glfw
+import mujoco
+import numpy as np
+
+from fivebar_sim import model, render_scene, resources, tables
+from fivebar_sim.errors import ConfigError, unknown
+from fivebar_sim.geometry import FiveBar
+from fivebar_sim.render_replay import Replay
+from fivebar_sim.scenario import Scenario
+from fivebar_sim.servo import Servo
+
+SECONDS = 1.0 / 60.0
+"""From one state shown to the next [s]."""
+LATE = 0.1
+"""Most that is simulated between two states shown [s]."""
+SLIDER = math.radians(60.0)
+"""How far the sliders turn the motors to either side of the rest pose [rad]."""
+
+
+def chosen(source: str) -> FiveBar | Scenario:
+    """Return the leg or scenario of a shipped name or a TOML file; only a scenario has a path.
+
+    Raises:
+        ConfigError: Neither; or the file says something illegal.
+    """
+    legs, scenarios = resources.shipped("models/legs"), resources.shipped("scenarios")
+    if source in legs:
+        return FiveBar.load(source)
+    if source in scenarios:
+        return Scenario.load(source)
+    file = Path(source)
+    if file.suffix != ".toml":
+        known = unknown("leg or scenario", source, {**legs, **scenarios})
+        raise ConfigError(f"{known}; or a path to a .toml")
+    table = tables.read(file, "leg or scenario")
+    return Scenario.load(source) if "path" in table else FiveBar.load(source)
+
+
+def check_screen() -> None:
+    """Raise unless a window can be opened.
+
+    Raises:
+        ConfigError: Linux without DISPLAY and WAYLAND_DISPLAY.
+    """
+    if sys.platform == "linux" and not any(
+        os.environ.get(name) for name in ("DISPLAY", "WAYLAND_DISPLAY")
+    ):
+        raise ConfigError(
+            "no screen here: neither DISPLAY nor WAYLAND_DISPLAY is set; `fivebar render` draws "
+            "a run without one"
+        )
+
+
+def moment(replay: Replay, elapsed: float) -> float:
+    """Return the moment of the run to show [s]: all of it once, then its cycle over and over.
+
+    Args:
+        replay: The run.
+        elapsed: Since the start, by the clock [s].
+    """
+    start, length = replay.cycle
+    end = start + length
+    return elapsed if elapsed < end else start + (elapsed - end) % length
+
+
+def play(replay: Replay, clock: Callable[[], float] = time.monotonic) -> None:
+    """Show a run in real time until the window is closed.
+
+    Args:
+        replay: The run.
+        clock: Tells the time [s].
+
+    Raises:
+        ConfigError: No window can be opened.
+    """
+    camera = render_scene.fit(replay, aspect=1.0)
+    render_scene.dress(replay, camera)
+    data = mujoco.MjData(replay.model)
+    with _window(replay.model, data, controls=False) as window:
+        with window.lock():
+            camera.aim(window.cam)
+        start = clock()
+        while window.is_running():
+            row = replay.row(moment(replay, clock() - start))
+            with window.lock():
+                data.time = (row + 1) * replay.scenario.sim.timestep
+                data.qpos[:] = replay.qpos[row]
+                mujoco.mj_forward(replay.model, data)
+                window.user_scn.ngeom = 0
+                render_scene.decorate(window.user_scn, replay, row, camera.eye)
+            window.sync()
+            time.sleep(SECONDS)
+
+
+def hold(leg: FiveBar, clock: Callable[[], float] = time.monotonic) -> None:
+    """Show a leg in its rest pose, held by servos whose commands are the viewer's sliders.
+
+    Args:
+        leg: The leg.
+        clock: Tells the time [s].
+
+    Raises:
+        ConfigError: No window can be opened.
+    """
+    built = model.build(leg, servo=Servo())
+    data = mujoco.MjData(built)
+    mujoco.mj_resetDataKeyframe(built, data, built.key("home").id)
+    built.actuator_ctrllimited[:] = True
+    built.actuator_ctrlrange[:] = data.ctrl[:, None] + np.array([-SLIDER, SLIDER])
+    middle = np.array([0.0, 0.0, (model.HIP_HEIGHT - 0.4) * leg.size])
+    with _window(built, data, controls=True) as window:
+        with window.lock():
+            render_scene.Camera(middle, 2.0 * leg.size, built.vis.global_.fovy).aim(window.cam)
+        start = clock()
+        while window.is_running():
+            due = min(clock() - start, data.time + LATE)  # a slow machine falls behind the clock
+            with window.lock():
+                while data.time < due:
+                    mujoco.mj_step(built, data)
+            window.sync()
+            time.sleep(SECONDS)
+
+
+@contextmanager
+def _window(built: mujoco.MjModel, data: mujoco.MjData, *, controls: bool) -> Iterator[Any]:
+    """Give an open viewer of a model, whose loop is the caller's; closed at the end.
+
+    Raises:
+        ConfigError: It cannot open a window.
+    """
+    check_screen()
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        if not glfw.init():  # MuJoCo would end the process
+            raise ConfigError("the viewer cannot open a window: the screen does not answer")
+    try:
+        from mujoco import viewer
+
+        window = viewer.launch_passive(built, data, show_left_ui=False, show_right_ui=controls)
+    except (RuntimeError, mujoco.FatalError) as error:
+        raise ConfigError(f"the viewer cannot open a window: {error}") from None
+    with window:
+        yield window

@@ -1,0 +1,287 @@
+"""`fivebar render`: the leg where kinematics has it, frames in time, and what is refused.
+
+Without a GL the drawing tests are skipped; where the environment says FIVEBAR_GL=required they
+fail instead.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+from shell import Shell
+
+from fivebar_sim import FiveBar, gl, kinematics, render, render_files, render_scene, resources
+from fivebar_sim.arrays import Array
+from fivebar_sim.errors import ConfigError, RunDirectoryError
+from fivebar_sim.metrics import JOINT_COLUMNS, Record
+from fivebar_sim.model import HIP_HEIGHT
+from fivebar_sim.render_replay import Replay, Span, replay
+from fivebar_sim.scenario import Scenario
+
+SMALL = ("--width", "128", "--height", "96")
+SCENES = {
+    "air": {"kind": "air"},
+    "payload": {"kind": "payload", "mass": 0.1},
+    "rail": {"kind": "rail"},
+    "treadmill": {"kind": "treadmill", "speed": 0.1},
+}
+BLUE, ORANGE = (0, 2), (2, 0)  # the stronger and the weaker channel of the links' colours
+
+
+@pytest.fixture(scope="session")
+def drawing() -> None:
+    """Skip, or fail if it is required, where nothing can be drawn."""
+    try:
+        gl.find()
+    except ConfigError as error:
+        if os.environ.get("FIVEBAR_GL") == "required":
+            pytest.fail(str(error))
+        pytest.skip(str(error))
+
+
+def posed(leg: FiveBar, scene: str = "air", steps: int = 500) -> Replay:
+    """Return a run that holds a leg in its rest pose: no simulation is needed to draw it.
+
+    A ground pushes it upwards in the first half of the run.
+    """
+    table = {
+        "name": "rest",
+        "leg": leg.name,
+        "scene": SCENES[scene],
+        "duration": 1e-3 * steps,
+        "path": {"kind": "circle", "centre": [0.0, 0.0], "radius": 0.01, "frequency": 4.0},
+    }
+    scenario = Scenario.from_table(table, "test", Path())
+    q = kinematics.home(leg)
+    foot_x, foot_z = (float(x) for x in kinematics.chain_points(leg, q).F)
+    full: Array = np.ones(steps)
+    record: Record = {name: float(x) * full for name, x in zip(JOINT_COLUMNS, q, strict=True)}
+    for what in ("foot", "target"):
+        record |= {f"{what}_x": foot_x * full, f"{what}_z": foot_z * full}
+    record["time"] = np.linspace(1e-3, 1e-3 * steps, steps)
+    if scene != "air":
+        record |= {"hip_z": full * (leg.foot_radius - foot_z)}
+        record |= {"ground_x": 0.0 * full, "ground_z": np.repeat([5.0, 0.0], steps // 2)}
+    if scene == "treadmill":
+        record["belt_x"] = -0.1 * record["time"]
+    return replay(scenario, record)
+
+
+def pixel(drawn: render.Stage, point: np.ndarray, size: tuple[int, int]) -> tuple[int, int]:
+    """Return (row, column) of a point (x, z) [m], by a pinhole camera of its own."""
+    camera, (width, height) = drawn.camera, size
+    ray = np.array([point[0], 0.0, point[1]]) - camera.eye
+    right, forward = np.array([1.0, 0.0, 0.0]), camera.forward
+    scale = 0.5 * height / np.tan(np.radians(0.5 * camera.field)) / (ray @ forward)
+    up = np.cross(right, forward)
+    return round(0.5 * height - scale * (ray @ up)), round(0.5 * width + scale * (ray @ right))
+
+
+def is_link(frame: render.Frame, channels: tuple[int, int]) -> np.ndarray:
+    """Return where the colour of a side's links is."""
+    weak, strong = frame[..., channels[0]].astype(int), frame[..., channels[1]].astype(int)
+    return strong - weak > 90
+
+
+@pytest.mark.usefixtures("drawing")
+@pytest.mark.parametrize("scene", SCENES)
+@pytest.mark.parametrize("name", resources.shipped("models/legs"))
+def test_links_and_target_are_where_kinematics_has_them(name: str, scene: str) -> None:
+    leg, size = FiveBar.load(name), (200, 150)
+    if scene in ("rail", "treadmill") and name == "airhockey":
+        pytest.skip("a leg that lies flat cannot stand")
+    shown = posed(leg, scene)
+    points = kinematics.chain_points(leg, kinematics.home(leg))
+    A, E = kinematics.bases(leg)
+    hip = np.array([0.0, shown.hip[0]])
+    with render.stage(shown, *size) as drawn:
+        frame = drawn.frame(0.4)
+        for start, end, channels in (
+            (A, points.B, BLUE),
+            (points.B, points.C_left, BLUE),
+            (E, points.D, ORANGE),
+            (points.D, points.C_right, ORANGE),
+        ):
+            at = pixel(drawn, start + 0.6 * (end - start) + hip, size)
+            around = is_link(frame, channels)[at[0] - 2 : at[0] + 3, at[1] - 2 : at[1] + 3]
+            assert around.any(), (name, scene, at)
+        row, column = pixel(drawn, points.F + hip, size)
+        near = frame[row - 2 : row + 3, column - 2 : column + 3].astype(int)
+        green = near[..., 1] - np.maximum(near[..., 0], near[..., 2])
+        assert green.max() > 40, (name, scene)
+    edge = np.concatenate([frame[[0, -1]].reshape(-1, 3), frame[:, [0, -1]].reshape(-1, 3)])
+    assert not (is_link(edge, BLUE) | is_link(edge, ORANGE)).any()  # nothing is cut off
+
+
+@pytest.mark.usefixtures("drawing")
+def test_ground_pushes_the_foot_with_an_arrow() -> None:
+    leg, size = FiveBar.load("classic"), (200, 150)
+    shown = posed(leg, "rail")
+    half_way = kinematics.chain_points(leg, kinematics.home(leg)).F
+    half_way = half_way + np.array([0.0, shown.hip[0] + 0.3 * leg.size])
+    with render.stage(shown, *size) as drawn:
+        row, column = pixel(drawn, half_way, size)
+        near = np.s_[row - 2 : row + 3, column - 2 : column + 3]
+        stance, flight = (drawn.frame(time)[near].astype(int) for time in (0.1, 0.4))
+    for frame, seen in ((stance, True), (flight, False)):  # violet: little green
+        assert (np.minimum(frame[..., 0], frame[..., 2]) - frame[..., 1] > 40).any() == seen
+
+
+@pytest.mark.usefixtures("drawing")
+def test_marks_of_the_belt_are_back_in_place_after_a_period() -> None:
+    shown = posed(FiveBar.load("classic"), "treadmill", steps=1000)  # nothing else moves
+    with render.stage(shown, 200, 150) as drawn:
+        before, within, after = (drawn.frame(t).astype(int) for t in (0.6, 0.7, 0.85))
+    assert np.abs(after - before).max() < 20 < np.abs(within - before).max()
+
+
+def test_camera_sees_all_of_the_motion() -> None:
+    shown = posed(FiveBar.load("classic"))
+    for aspect in (0.3, 1.0, 3.0):
+        camera = render_scene.fit(shown, aspect)
+        seen = shown.fitted()
+        ray = np.stack([seen[:, 0], 0.0 * seen[:, 0], seen[:, 1]], axis=-1) - camera.eye
+        depth = ray @ camera.forward
+        tangent = np.tan(np.radians(0.5 * camera.field))
+        across = np.abs(ray[:, 0]) / depth / (tangent * aspect)
+        up = np.abs(ray @ np.cross([1.0, 0.0, 0.0], camera.forward)) / depth / tangent
+        assert 0.6 < max(across.max(), up.max()) < 1.0
+
+
+@pytest.mark.usefixtures("drawing")
+def test_files_of_a_run(shell: Shell) -> None:
+    assert shell("run", "short.toml", "--out", "mine", "--quiet").status == 0
+    said = shell("render", "mine", "--out", "leg.gif", *SMALL)
+    assert said.status == 0
+    assert said.out.startswith("drew 8 frames of short into leg.gif: ")  # 0.25 s at 30 a second
+    with Image.open("leg.gif") as film:
+        assert (film.size, film.info["loop"]) == ((128, 96), 0)
+        shown = []
+        for k in range(getattr(film, "n_frames", 1)):
+            film.seek(k)
+            shown.append(film.info["duration"])
+    assert (len(shown), sum(shown)) == (8, 250)
+    first = Path("leg.gif").read_bytes()
+    assert shell("render", "mine", "--out", "leg.gif", *SMALL).status == 0
+    assert Path("leg.gif").read_bytes() == first
+    assert shell("render", "mine", "--out", "at.PNG", "--at", "0.3", *SMALL).status == 0
+    with Image.open("at.PNG") as picture:
+        assert picture.size == (128, 96)
+    assert {"leg.gif", "at.PNG"} <= shell.names()
+    assert not [name for name in shell.names() if name.startswith(".")]
+
+
+@pytest.mark.usefixtures("drawing")
+@pytest.mark.skipif(shutil.which("ffprobe") is None, reason="no ffmpeg here")
+def test_film_shows_all_of_the_run(shell: Shell) -> None:
+    assert shell("run", "short.toml", "--out", "mine", "--quiet").status == 0
+    options = ("--fps", "20", "--speed", "0.5", *SMALL)
+    assert shell("render", "mine", "--out", "leg.mp4", *options).status == 0
+    wanted = "stream=width,height,r_frame_rate,nb_frames"
+    probe = ["ffprobe", "-v", "error", "-show_entries", wanted, "-of", "csv=p=0", "leg.mp4"]
+    told = subprocess.run(probe, capture_output=True, text=True, check=True).stdout
+    assert told.strip() == "128,96,20/1,24"
+
+
+def test_a_gif_shows_the_last_whole_period_and_others_all_of_the_run() -> None:
+    shown = posed(FiveBar.load("classic"), steps=950)  # ramp 0.25 s, period 0.25 s
+    assert render.span(shown, ".gif") == pytest.approx((0.5, 0.25))
+    assert render.span(shown, ".mp4") == pytest.approx((0.0, 0.95))
+    times = render.moments(Span(0.5, 0.25), render.Film(fps=40.0, speed=0.5))
+    assert times == pytest.approx(0.5 + 0.0125 * np.arange(20))
+
+
+def test_times_of_a_gif_do_not_add_up_their_rounding() -> None:
+    shown = render_files.durations(7, 0.2273)
+    assert sum(shown) == 230
+    assert np.abs(np.cumsum(shown) - 227.3 / 7 * np.arange(1, 8)).max() <= 5.0
+    assert set(render_files.durations(300, 10.0)) == {30, 40}
+
+
+def test_rows_are_the_states_nearest_in_time() -> None:
+    shown = posed(FiveBar.load("classic"), steps=500)
+    assert [shown.row(t) for t in (0.0, 0.001, 0.0024, 0.25, 0.5)] == [0, 0, 1, 249, 499]
+    assert shown.hip[0] == HIP_HEIGHT * shown.scenario.leg.size
+
+
+def test_a_record_without_the_columns_of_its_scene_is_refused() -> None:
+    shown = posed(FiveBar.load("classic"), "rail")
+    with pytest.raises(RunDirectoryError, match="'rail': it lacks the column hip_z"):
+        replay(shown.scenario, {})
+
+
+REFUSED = [
+    (("--out", "leg.jpg"), "cannot draw leg.jpg: the picture must end in .gif, .mp4, .png"),
+    (("--width", "63"), "width must be in [64, 4096] pixels, got 63"),
+    (("--height", "5000"), "height must be in [64, 4096] pixels, got 5000"),
+    (("--out", "a.mp4", "--width", "101"), "width of a .mp4 must be even, got 101"),
+    (("--fps", "0"), "fps must be in [0.1, 50] 1/s, got 0.0"),
+    (("--fps", "60"), "fps must be in [0.1, 50] 1/s, got 60.0"),
+    (("--speed", "nan"), "speed must be in [0.0001, 10000], got nan"),
+    (("--out", "a.png", "--at", "9"), "at must be in [0, 0.6] s, got 9.0"),
+    (("--at", "0.3"), "at is the moment of a .png, and short.gif is none"),
+    (("--speed", "1e-4"), "a .gif of 640 x 480 may have up to 813 frames, got 75000"),
+    (("--out", "no/leg.gif"), "cannot write no/leg.gif: No such file or directory"),
+    (("--out", "mine.gif"), "cannot write mine.gif: a directory is there"),
+]
+
+
+def test_what_cannot_be_drawn_is_one_line(shell: Shell, monkeypatch: pytest.MonkeyPatch) -> None:
+    assert shell("run", "short.toml", "--out", "mine", "--quiet").status == 0
+    Path("mine.gif").mkdir()
+    monkeypatch.setattr(gl, "find", lambda: "egl")  # refused before anything is drawn
+    for arguments, line in REFUSED:
+        assert shell.refused("render", "mine", *arguments).startswith(line)
+    assert shell.refused("render", "no") == "no is no run directory: no such directory"
+    Path("mine/rollout.parquet").write_bytes(b"no")
+    assert "mine/rollout.parquet is no record" in shell.refused("render", "mine")
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="elsewhere MuJoCo's own GL is used")
+def test_a_gl_is_found_by_trying(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("MUJOCO_GL", raising=False)
+    monkeypatch.setattr(gl, "works", lambda way: True)
+    assert gl.find() == "egl"
+    monkeypatch.setattr(gl, "works", lambda way: way == "osmesa")
+    assert gl.find() == "osmesa"
+    monkeypatch.setenv("MUJOCO_GL", "EGL")
+    with pytest.raises(ConfigError, match=r"MUJOCO_GL=egl does not work .* libegl1, or unset"):
+        gl.find()
+    monkeypatch.setenv("MUJOCO_GL", "osmesa")
+    assert gl.find() == "osmesa"
+    monkeypatch.setenv("MUJOCO_GL", "glfw")
+    monkeypatch.setattr(gl, "works", lambda way: False)
+    with pytest.raises(ConfigError, match="install the Debian package libegl1 or libosmesa6"):
+        gl.find()
+
+
+def test_what_does_not_work_is_found_out() -> None:
+    assert not gl.works("no_such_way")
+
+
+@pytest.mark.parametrize(
+    ("program", "line"),
+    [
+        (None, "a .mp4 needs the program ffmpeg (Debian package ffmpeg); a .gif does not"),
+        ("#!/bin/sh\necho first >&2; echo 'disk full' >&2; exit 1\n", "ffmpeg failed: disk full"),
+        ("#!/bin/sh\ncat >/dev/null; exit 3\n", "ffmpeg failed: exit status 3"),
+    ],
+)
+def test_no_ffmpeg_or_one_that_fails(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, program: str | None, line: str
+) -> None:
+    if program is not None:
+        (tmp_path / "ffmpeg").write_text(program)
+        (tmp_path / "ffmpeg").chmod(0o755)
+    monkeypatch.setenv("PATH", f"{tmp_path}:/bin" if program else str(tmp_path))
+    frames = (np.zeros((96, 128, 3), np.uint8) for _ in range(100))
+    with pytest.raises(ConfigError) as error:
+        render_files.write_mp4(tmp_path / "leg.mp4", frames, 30.0)
+    assert str(error.value) == line
