@@ -13,7 +13,7 @@ from fivebar_sim.control_step import ControlStep, whole_steps
 from fivebar_sim.errors import ConfigError, DivergedError, FiveBarError, PoseError
 from fivebar_sim.motion import Motion
 from fivebar_sim.record import broken
-from fivebar_sim.simulate import States, check, is_broken, simulate_asking
+from fivebar_sim.simulate import States, Watch, check, is_broken, simulate_asking
 
 if TYPE_CHECKING:
     from fivebar_sim.rollout import Plan
@@ -32,7 +32,7 @@ class _Group(NamedTuple):
     wanted: Reference
 
 
-def steer(plans: Sequence[Plan], nthread: int) -> States:
+def steer(plans: Sequence[Plan], nthread: int, watch: Watch | None) -> States:
     """Return the states of plans with feedback controllers of one timestep, length and period.
 
     Raises:
@@ -66,7 +66,7 @@ def steer(plans: Sequence[Plan], nthread: int) -> States:
         return ctrl
 
     start = np.stack([plan.start for plan in plans])
-    states = simulate_asking([plan.model for plan in plans], start, steps, ask, nthread)
+    states = simulate_asking([plan.model for plan in plans], start, steps, ask, nthread, watch)
     if states.time.shape[1] < steps:  # the others' were ended with it
         _raise_broken(plans, states)
     return states

@@ -22,21 +22,23 @@ MOTORS = [0, 2]
 """Where the four joints have A and E."""
 
 
-def columns(planned: Plan, states: States) -> Record:
+def columns(planned: Plan, states: States, begin: int = 0) -> Record:
     """Return the record: row k is the state at t = (k + 1) h, and what the step to it did.
 
     Foot and gap are those of qpos itself, not MuJoCo's kinematics of the step before.
 
     Args:
         planned: What was simulated.
-        states: Of this one simulation, of all its steps or of the first ones.
+        states: Of this one simulation, of all its steps or of some.
+        begin: The step that the first of them is; after 0, the torque of that one is not known,
+            and is the one of a step from where the leg should have been, at rest.
     """
     leg, wanted = planned.scenario.leg, planned.motion
     q, v, ctrl = _joints(states)
     points = kinematics.chain_points(leg, q)
-    rows = slice(1, len(q) + 1)
+    rows = slice(begin + 1, begin + len(q) + 1)
     target, gap = wanted.foot[rows], points.C_right - points.C_left
-    torque = _torque(planned, states)
+    torque = _torque(planned, states, begin)
     record = {
         "time": wanted.time[rows],
         "target_x": target[:, 0],
@@ -49,7 +51,7 @@ def columns(planned: Plan, states: States) -> Record:
     record |= {"ctrl_A": ctrl[:, 0], "ctrl_E": ctrl[:, 1]}
     record |= {"torque_A": torque[:, 0], "torque_E": torque[:, 1]}
     record["gap"] = np.hypot(gap[:, 0], gap[:, 1])
-    record |= _surroundings(planned, states)
+    record |= _surroundings(planned, states, begin)
     return {name: np.ascontiguousarray(column) for name, column in record.items()}
 
 
@@ -58,10 +60,10 @@ def _joints(states: States) -> tuple[Array, Array, Array]:
     return states.qpos[0, :, -4:], states.qvel[0, :, -4:], states.ctrl[0, :, -2:]
 
 
-def _before(planned: Plan, states: States) -> tuple[Array, Array]:
+def _before(planned: Plan, states: States, begin: int = 0) -> tuple[Array, Array]:
     """Return motor angles and rates before each step; the run starts at rest."""
     q, v, _ = _joints(states)
-    q = np.concatenate([planned.motion.q[:1], q[:-1]])
+    q = np.concatenate([planned.motion.q[begin : begin + 1], q[:-1]])
     return q[:, MOTORS], np.concatenate([np.zeros((1, 4)), v[:-1]])[:, MOTORS]
 
 
@@ -69,14 +71,14 @@ def _drive(planned: Plan) -> Drive:
     return getattr(planned.scenario.controller, "drive", "position")
 
 
-def _torque(planned: Plan, states: States) -> Array:
+def _torque(planned: Plan, states: States, begin: int) -> Array:
     """Return the torque that each motor gave in each step [N m], (N, 2)."""
     scenario, (q_next, v_next, ctrl) = planned.scenario, _joints(states)
     return applied_torque(
         scenario.servo,
         scenario.sim.integrator,
         ctrl,
-        *_before(planned, states),
+        *_before(planned, states, begin),
         q_next[:, MOTORS],
         v_next[:, MOTORS],
         _drive(planned),
@@ -89,7 +91,7 @@ def saturated(planned: Plan, states: States) -> Bools:
     return clipped(planned.scenario.servo, ctrl, *_before(planned, states), _drive(planned))
 
 
-def _surroundings(planned: Plan, states: States) -> Record:
+def _surroundings(planned: Plan, states: States, begin: int) -> Record:
     """Return the columns of what the leg hangs on and stands on."""
     scene, steps = planned.scenario.scene, states.time.shape[1]
     record: Record = {}
@@ -97,7 +99,9 @@ def _surroundings(planned: Plan, states: States) -> Record:
         record |= {"hip_z": states.qpos[0, :, 0], "hip_dot_z": states.qvel[0, :, 0]}
         record |= {"ground_x": states.ground[0, :, 0], "ground_z": states.ground[0, :, 1]}
     if isinstance(scene, Treadmill):
-        record["belt_x"] = -(scene.speed or 0.0) * planned.motion.time[1 : steps + 1]
+        record["belt_x"] = (
+            -(scene.speed or 0.0) * planned.motion.time[begin + 1 : begin + steps + 1]
+        )
     return record
 
 

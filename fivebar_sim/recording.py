@@ -78,13 +78,13 @@ def write(path: Path, runs: Sequence[Run], labels: Sequence[str] = ()) -> None:
         RerunDisabledError: The environment variable RERUN switches Rerun off.
     """
     names = list(labels) or [run.scenario.name for run in runs]
-    with _session():
+    with session():
         data = _encoded(runs, names)
     path.write_bytes(data)
 
 
 @contextmanager
-def _session() -> Iterator[None]:
+def session() -> Iterator[None]:
     """Let mistakes in the use of Rerun raise (they are warnings otherwise), and tidy up after it.
 
     Rerun's strictness is global, so one recording is made at a time. A recording that nothing
@@ -113,24 +113,42 @@ def _encoded(runs: Sequence[Run], names: list[str]) -> bytes:
     room = stage([run.scenario.leg for run in runs], moved)
     text = summary(names, [run.metrics for run in runs], [run.scenario.limits for run in runs])
 
-    name = " + ".join(names)
-    stream = rr.RecordingStream(APPLICATION, recording_id=name, send_properties=False)
-    if not stream.is_enabled():
-        raise RerunDisabledError(
-            f"Rerun is switched off: RERUN must be unset or 'on', got {os.environ.get('RERUN')!r}"
-        )
+    stream = started(" + ".join(names))
     output = stream.binary_stream()
-    stream.send_recording_name(name)
     layout.send(stream, layout.contents(room, shown, plots))
-    stream.log("/", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
     stream.log(layout.SUMMARY, rr.TextDocument(text, media_type="text/markdown"), static=True)
-    if room.floor:
-        ground.log_floor(stream, room)
+    log_room(stream, room)
     for run, look, poses, lines in zip(runs, shown, moved, plots, strict=True):
         _send_run(stream, run, look, poses, lines, room)
     data = output.read()
     assert data is not None
     return data
+
+
+def started(name: str) -> rr.RecordingStream:
+    """Return a new recording's stream, that goes nowhere yet.
+
+    Raises:
+        RerunDisabledError: The environment variable RERUN switches Rerun off.
+    """
+    import rerun as rr
+
+    stream = rr.RecordingStream(APPLICATION, recording_id=name, send_properties=False)
+    if not stream.is_enabled():
+        raise RerunDisabledError(
+            f"Rerun is switched off: RERUN must be unset or 'on', got {os.environ.get('RERUN')!r}"
+        )
+    stream.send_recording_name(name)
+    return stream
+
+
+def log_room(stream: rr.RecordingStream, room: Stage) -> None:
+    """Log what does not belong to any leg: which way is up, and the floor."""
+    import rerun as rr
+
+    stream.log("/", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
+    if room.floor:
+        ground.log_floor(stream, room)
 
 
 def _send_run(
@@ -145,7 +163,8 @@ def _send_run(
     import rerun as rr
 
     leg, time = run.scenario.leg, run.record["time"]
-    every, drawn = _times(time, np.arange(len(time))), _times(time, drawn_rows(time))
+    rows = drawn_rows(time)
+    every, drawn = times(time, np.arange(len(time)) + 1), times(time[rows], rows + 1)
     # as JSON, since a plain value keeps the type that it first had
     stream.send_property(f"{look.root}leg", rr.AnyValues(json=json.dumps(asdict(leg))))
     scene.log_leg(stream, leg, look)
@@ -154,18 +173,18 @@ def _send_run(
     foot.send_foot(stream, leg, moved, look, drawn)
     ground.send_ground(stream, leg, moved, look, drawn, room)
     for plot in plots:
-        _send_series(stream, plot, look, every)
+        send_series(stream, plot, look, every)
 
 
-def _times(time: Array, rows: Rows) -> list[rr.TimeColumn]:
-    """Return both timelines at some rows; row k is the state after k + 1 steps."""
+def times(time: Array, steps: Rows) -> list[rr.TimeColumn]:
+    """Return both timelines at the times [s] of some steps, counted from 1."""
     import rerun as rr
 
-    stamps = np.round(time[rows] * 1e9).astype("timedelta64[ns]")  # Rerun itself would truncate
-    return [rr.TimeColumn("sim_time", duration=stamps), rr.TimeColumn("step", sequence=rows + 1)]
+    stamps = np.round(time * 1e9).astype("timedelta64[ns]")  # Rerun itself would truncate
+    return [rr.TimeColumn("sim_time", duration=stamps), rr.TimeColumn("step", sequence=steps)]
 
 
-def _send_series(
+def send_series(
     stream: rr.RecordingStream, plot: Series, look: Look, times: list[rr.TimeColumn]
 ) -> None:
     """Send all lines of a plot as one column; a row without values is an empty one, a gap."""

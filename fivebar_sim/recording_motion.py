@@ -56,8 +56,8 @@ def motion(record: Mapping[str, Array], rows: Rows) -> Motion:
 
 
 def timestep(time: Array) -> float:
-    """Return h [s] of the times h, 2 h, ... N h."""
-    return float(time[-1]) / len(time)
+    """Return h [s] of times that are h apart; of one alone it is that time."""
+    return float(time[-1] - time[0]) / (len(time) - 1) if len(time) > 1 else float(time[0])
 
 
 def drawn_rows(time: Array) -> Rows:

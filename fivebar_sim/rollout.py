@@ -20,7 +20,7 @@ from fivebar_sim.provenance import provenance
 from fivebar_sim.record import broken, columns, saturated
 from fivebar_sim.scenario import Scenario
 from fivebar_sim.scenes import Ground, Payload
-from fivebar_sim.simulate import States, check, simulate
+from fivebar_sim.simulate import States, Watch, check, simulate
 
 
 class Plan(NamedTuple):
@@ -164,9 +164,14 @@ def run(scenario: Scenario) -> Result:
     return execute(plan(scenario))
 
 
-def execute(planned: Plan) -> Result:
-    """Return the result of one plan; see `run`."""
-    return run_all([planned])[0]
+def execute(planned: Plan, watch: Watch | None = None) -> Result:
+    """Return the result of one plan; see `run`.
+
+    Args:
+        planned: What to simulate.
+        watch: Is shown the states as they come.
+    """
+    return _result(planned, _simulated([planned], 1, watch))
 
 
 def run_all(plans: Sequence[Plan], nthread: int = 1) -> list[Result]:
@@ -189,22 +194,25 @@ def run_all(plans: Sequence[Plan], nthread: int = 1) -> list[Result]:
         structure = scenario.scene.kind, planned.model.ngeom  # a leg with L6 has a geom more
         return planned.motion.timestep, scenario.steps, *structure, asked
 
-    for key, group in groupby(sorted(range(len(plans)), key=alike), key=alike):
+    for _, group in groupby(sorted(range(len(plans)), key=alike), key=alike):
         members = list(group)
         chosen = [plans[i] for i in members]
-        states = feedback.steer(chosen, nthread) if key[-1] else _follow(chosen, nthread)
+        states = _simulated(chosen, nthread)
         for row, i in enumerate(members):
             results[i] = _result(plans[i], states.rows(slice(row, row + 1)))
     return [results[i] for i in range(len(plans))]
 
 
-def _follow(plans: Sequence[Plan], nthread: int) -> States:
-    """Return the states of plans whose setpoints are known."""
+def _simulated(plans: Sequence[Plan], nthread: int, watch: Watch | None = None) -> States:
+    """Return the states of plans that may be simulated together."""
+    if plans[0].setpoints is None:
+        return feedback.steer(plans, nthread, watch)
     return simulate(
         [p.model for p in plans],
         np.stack([p.start for p in plans]),
         np.stack([p.ctrl for p in plans]),
         nthread,
+        watch,
     )
 
 

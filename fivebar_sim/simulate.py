@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any, NamedTuple
 
@@ -18,6 +19,15 @@ STATE = mujoco.mjtState.mjSTATE_FULLPHYSICS | mujoco.mjtState.mjSTATE_CTRL
 
 CHUNK = 50_000
 """Steps, over all legs, between two moments at which an interrupt is heard: about 0.2 s."""
+
+WATCHED = 10_000
+"""Steps of a run whose commands are known that whoever watches is shown at once: about 0.06 s."""
+
+GLANCE = 0.2
+"""Time between two moments at which whoever watches a run in the loop is shown its steps [s]."""
+
+Watch = Callable[["States"], None]
+"""Is shown the states of some steps after the other while they are simulated."""
 
 
 class States(NamedTuple):
@@ -46,9 +56,9 @@ class States(NamedTuple):
         *fields, warnings = zip(*parts, strict=True)
         return cls(*(np.concatenate(field, axis=1) for field in fields), warnings=warnings[-1])
 
-    def first(self, steps: int) -> States:
-        """Return the first steps, as views."""
-        return States(*(field[:, :steps] for field in self[:-1]), warnings=self.warnings)
+    def part(self, steps: slice) -> States:
+        """Return some of the steps, as views."""
+        return States(*(field[:, steps] for field in self[:-1]), warnings=self.warnings)
 
     def rows(self, which: slice | list[int]) -> States:
         """Return some of the simulations."""
@@ -130,6 +140,7 @@ def simulate(
     qpos: Array,
     ctrl: Array,
     nthread: int = 1,
+    watch: Watch | None = None,
 ) -> States:
     """Return the states of legs that start at rest and are sent a table of commands.
 
@@ -138,19 +149,24 @@ def simulate(
         qpos: Start poses, (nsim, nq).
         ctrl: Commands of every step, (nsim, N, nu).
         nthread: Threads; 0 is one for every processor.
+        watch: Is shown the states as they come.
 
     Raises:
         ArgumentError: Shapes that do not fit, or commands that are not finite.
     """
-    legs = Legs(models, qpos, nthread)
+    legs, parts = Legs(models, qpos, nthread), []
     if ctrl.ndim != 3:
         legs.advance(ctrl)
-    return States.joined([legs.advance(part) for part in _chunks(ctrl)])
+    for part in _chunks(ctrl, CHUNK // max(len(ctrl), 1) if watch is None else WATCHED):
+        parts.append(legs.advance(part))
+        if watch is not None:
+            watch(parts[-1])
+    return States.joined(parts)
 
 
-def _chunks(ctrl: Array) -> Iterator[Array]:
+def _chunks(ctrl: Array, length: int) -> Iterator[Array]:
     """Yield some steps after the other, so that Ctrl-C is heard in between."""
-    length = max(1, CHUNK // len(ctrl))
+    length = max(1, length)
     for start in range(0, ctrl.shape[1], length):
         yield ctrl[:, start : start + length]
 
@@ -161,6 +177,7 @@ def simulate_asking(
     steps: int,
     ask: Callable[[States], Array | None],
     nthread: int = 1,
+    watch: Watch | None = None,
 ) -> States:
     """Return the states of legs whose commands depend on how they move.
 
@@ -171,14 +188,15 @@ def simulate_asking(
         ask: Given the states so far, none at first, returns the commands of the next n steps,
             (nsim, n, nu), n as it likes; None ends the run early.
         nthread: Threads; 0 is one for every processor.
+        watch: Is shown the states as they come.
 
     Raises:
         ArgumentError: Shapes that do not fit, or commands that are not finite.
     """
     legs = Legs(models, qpos, nthread)
-    states, k = legs.nothing(steps), 0
+    states, k, shown, last = legs.nothing(steps), 0, 0, time.monotonic()
     while k < steps:
-        ctrl = ask(states.first(k))
+        ctrl = ask(states.part(slice(k)))
         if ctrl is None:
             break
         part = legs.advance(ctrl[:, : steps - k])
@@ -186,7 +204,10 @@ def simulate_asking(
         for whole, piece in zip(states[:-1], part[:-1], strict=True):
             whole[:, k : k + n] = piece
         states, k = states._replace(warnings=part.warnings), k + n
-    return states.first(k)
+        if watch is not None and (time.monotonic() - last >= GLANCE or k == steps):
+            watch(states.part(slice(shown, k)))
+            shown, last = k, time.monotonic()
+    return states.part(slice(k))
 
 
 SPEED_LIMIT = 1e4
@@ -219,8 +240,7 @@ def check(states: States, timestep: float) -> None:
 
 def is_broken(states: States, steps: slice) -> bool:
     """Return whether a simulation broke down in some of the steps."""
-    part = States(*(field[:, steps] for field in states[:-1]), warnings=states.warnings)
-    return not (_moves(part).all() and not part.warnings.any())
+    return not (_moves(states.part(steps)).all() and not states.warnings.any())
 
 
 def _sound(states: States, timestep: float) -> Bools:

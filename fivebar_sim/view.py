@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
-import sys
 import time
 import warnings
 from collections.abc import Callable, Iterator
@@ -16,12 +14,15 @@ import glfw
 import mujoco
 import numpy as np
 
-from fivebar_sim import model, render_scene, resources, tables
+from fivebar_sim import model, render_scene, resources, screen, tables
 from fivebar_sim.errors import ConfigError, unknown
 from fivebar_sim.geometry import FiveBar
 from fivebar_sim.render_replay import Replay
 from fivebar_sim.scenario import Scenario
 from fivebar_sim.servo import Servo
+
+INSTEAD = "`fivebar render` draws a run without one"
+"""What works where no window can open."""
 
 SECONDS = 1.0 / 60.0
 """From one state shown to the next [s]."""
@@ -48,21 +49,6 @@ def chosen(source: str) -> FiveBar | Scenario:
         raise ConfigError(f"{known}; or a path to a .toml")
     table = tables.read(file, "leg or scenario")
     return Scenario.load(source) if "path" in table else FiveBar.load(source)
-
-
-def check_screen() -> None:
-    """Raise unless a window can be opened.
-
-    Raises:
-        ConfigError: Linux without DISPLAY and WAYLAND_DISPLAY.
-    """
-    if sys.platform == "linux" and not any(
-        os.environ.get(name) for name in ("DISPLAY", "WAYLAND_DISPLAY")
-    ):
-        raise ConfigError(
-            "no screen here: neither DISPLAY nor WAYLAND_DISPLAY is set; `fivebar render` draws "
-            "a run without one"
-        )
 
 
 def moment(replay: Replay, elapsed: float) -> float:
@@ -142,7 +128,7 @@ def _window(built: mujoco.MjModel, data: mujoco.MjData, *, controls: bool) -> It
     Raises:
         ConfigError: It cannot open a window.
     """
-    check_screen()
+    screen.check(INSTEAD)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         if not glfw.init():  # MuJoCo would end the process

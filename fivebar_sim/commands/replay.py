@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import os
-import sys
 from pathlib import Path
 from typing import Annotated
 
 from tyro.conf import Positional, arg
 
+from fivebar_sim import screen
 from fivebar_sim.errors import ConfigError
 
 RunDir = Positional[Annotated[Path, arg(metavar="RUN_DIR")]]
@@ -40,11 +39,8 @@ def _show(run_dirs: tuple[Path, ...]) -> int:
 
     with recording_file.opened(run_dirs) as file:
         command = recording_viewer.native(file)
-        if sys.platform == "linux" and not {"DISPLAY", "WAYLAND_DISPLAY"} & os.environ.keys():
-            raise ConfigError(
-                "no screen here: neither DISPLAY nor WAYLAND_DISPLAY is set; `fivebar replay "
-                f"{' '.join(map(str, run_dirs))} --web` shows it in a browser"
-            )
+        shown = f"`fivebar replay {' '.join(map(str, run_dirs))} --web` shows it in a browser"
+        screen.check(shown)
         return subprocess.run(command, env=recording_viewer.quiet()).returncode
 
 

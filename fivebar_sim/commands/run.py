@@ -7,11 +7,19 @@ from typing import TYPE_CHECKING, Annotated
 
 from tyro.conf import arg
 
-from fivebar_sim.commands.common import FAILED, Scenarios, Settings, plans_of, say, screen, working
+from fivebar_sim.commands.common import (
+    FAILED,
+    Scenarios,
+    Settings,
+    plans_of,
+    say,
+    screen,
+    working,
+)
 from fivebar_sim.errors import ConfigError, DivergedError
 
 if TYPE_CHECKING:
-    from fivebar_sim.rollout import Plan
+    from fivebar_sim.rollout import Plan, Result
 
 
 def run(
@@ -20,6 +28,8 @@ def run(
     *,
     out: Annotated[str | None, arg(metavar="DIR")] = None,
     settings: Settings = (),
+    live: bool = False,
+    live_at: Annotated[str | None, arg(metavar="HOST:PORT")] = None,
     quiet: bool = False,
     json: bool = False,
 ) -> int:
@@ -30,6 +40,8 @@ def run(
         out: Run directory of one scenario, or the folder of several (default runs/NAME).
         settings: Change one key of every scenario, as leg.L2=0.07 or "path.radii=[0.02, 0.01]";
             repeats. Another path.kind keeps the keys that both kinds have.
+        live: Show the runs in a new Rerun viewer while they are simulated.
+        live_at: The same in a viewer that listens on this machine already.
         quiet: Print nothing but errors.
         json: Print the metrics as JSON instead of tables.
     """
@@ -39,14 +51,40 @@ def run(
     places = _places(plans, out)
     for place in places:
         run_directory.check_place(place)
-    return _run(plans, places, quiet=quiet, as_json=json)
+    viewer = _viewer(live_at) if live or live_at is not None else None
+    return _run(plans, places, viewer, quiet=quiet, as_json=json)
 
 
-def _run(plans: list[Plan], places: list[Path], *, quiet: bool, as_json: bool) -> int:
+def _viewer(address: str | None) -> str:
+    """Return the address of a viewer that listens; None: of a new one."""
+    from fivebar_sim import live
+    from fivebar_sim.screen import check
+
+    if address is not None:
+        return live.checked(address)
+    check("--live-at shows the run in a viewer that listens already")
+    return live.spawned()
+
+
+def _execute(planned: Plan, viewer: str | None) -> Result:
+    """Simulate one plan, in sight of a viewer where there is one."""
+    from fivebar_sim import rollout
+
+    if viewer is None:
+        return rollout.execute(planned)
+    from fivebar_sim import live
+
+    with live.streaming(planned, viewer) as watch:
+        return rollout.execute(planned, watch)
+
+
+def _run(
+    plans: list[Plan], places: list[Path], viewer: str | None, *, quiet: bool, as_json: bool
+) -> int:
     """Run the plans one after the other; return the highest status."""
     import json
 
-    from fivebar_sim import console, rollout
+    from fivebar_sim import console
 
     status, metrics = 0, {}
     out = screen()
@@ -54,7 +92,7 @@ def _run(plans: list[Plan], places: list[Path], *, quiet: bool, as_json: bool) -
         name = planned.scenario.name
         try:
             with working(f"simulating {name}", quiet=quiet):
-                result = rollout.execute(planned)
+                result = _execute(planned, viewer)
                 result.write(place)
         except DivergedError as error:
             say(error)

@@ -20,12 +20,12 @@ def view(
     Args:
         source: A scenario or a leg: a shipped name or a TOML file.
     """
-    from fivebar_sim import rollout, view
+    from fivebar_sim import rollout, screen, view
     from fivebar_sim.geometry import FiveBar
     from fivebar_sim.render_replay import replay
 
     what = view.chosen(source)
-    view.check_screen()
+    screen.check(view.INSTEAD)
     if isinstance(what, FiveBar):
         view.hold(what)
         return 0

@@ -1,0 +1,23 @@
+"""Whether windows can open."""
+
+from __future__ import annotations
+
+import os
+import sys
+
+from fivebar_sim.errors import ConfigError
+
+
+def check(instead: str) -> None:
+    """Raise where no window can open.
+
+    Args:
+        instead: What works there, for the message.
+
+    Raises:
+        ConfigError: On Linux, with neither DISPLAY nor WAYLAND_DISPLAY.
+    """
+    if sys.platform == "linux" and not any(
+        os.environ.get(name) for name in ("DISPLAY", "WAYLAND_DISPLAY")
+    ):
+        raise ConfigError(f"no screen here: neither DISPLAY nor WAYLAND_DISPLAY is set; {instead}")

@@ -1,0 +1,111 @@
+"""Runs shown while they are simulated: what is sent is what was simulated, and stays so."""
+
+from __future__ import annotations
+
+import socket
+from pathlib import Path
+
+import numpy as np
+import pytest
+import rerun as rr
+from recorded import read
+from shell import Shell
+
+from fivebar_sim import live, rollout, simulate
+from fivebar_sim.errors import ConfigError
+from fivebar_sim.scenario import Scenario
+
+RUNS = {
+    "setpoints": ("classic-ellipse", ["duration=0.9"]),
+    "feedback": ("classic-ellipse", ["duration=0.9", "controller={name='pd', period=0.002}"]),
+    "ground": ("treadmill-trot", ["duration=0.9"]),
+}
+
+
+@pytest.fixture
+def kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Keep what would go to a viewer in a file."""
+    file = tmp_path / "live.rrd"
+
+    def keep(self: rr.RecordingStream, url: str) -> None:
+        assert url == "rerun+http://127.0.0.1:9876/proxy"
+        self.save(file)
+
+    monkeypatch.setattr(rr.RecordingStream, "connect_grpc", keep)
+    monkeypatch.setattr(simulate, "WATCHED", 130)
+    monkeypatch.setattr(simulate, "GLANCE", 0.0)
+    return file
+
+
+@pytest.mark.parametrize("name", RUNS)
+def test_what_is_sent_is_what_was_simulated(name: str, kept: Path) -> None:
+    source, settings = RUNS[name]
+    plan = rollout.plan(Scenario.load(source, settings))
+    with live.streaming(plan, "127.0.0.1:9876") as watch:
+        result = rollout.execute(plan, watch)
+    alone = rollout.execute(plan)
+    for column, values in result.record.items():
+        np.testing.assert_array_equal(values, alone.record[column], err_msg=column)
+
+    moving, static = read(kept)
+    rows = np.array(moving["/hip/L1"]["step"]) - 1
+    assert 50 <= len(rows) <= 80 or name == "feedback"  # 60 Hz, and the first of every part
+    assert (np.diff(rows) > 0).all()
+    assert rows[0] == 0
+    np.testing.assert_array_equal(
+        moving["/hip/L1"]["sim_time"], np.round(1e9 * result.record["time"][rows])
+    )
+    torque = np.array(moving["/torque"]["Scalars:scalars"])
+    expected = np.stack([result.record["torque_A"], result.record["torque_E"]], axis=-1)
+    np.testing.assert_array_equal(torque, 1e3 * expected[rows])
+    error = np.hypot(
+        result.record["foot_x"] - result.record["target_x"],
+        result.record["foot_z"] - result.record["target_z"],
+    )
+    np.testing.assert_array_equal(
+        np.ravel(moving["/tracking_error"]["Scalars:scalars"]), 1e3 * error[rows]
+    )
+    assert ("/floor" in static) == (name == "ground")
+
+
+@pytest.mark.parametrize(
+    ("address", "said"),
+    [
+        ("9876", "--live-at takes HOST:PORT, as 127.0.0.1:9876, got '9876'"),
+        ("localhost:0", "--live-at takes HOST:PORT"),
+        ("localhost:http", "--live-at takes HOST:PORT"),
+        ("192.0.2.1:9876", "--live-at must be on this machine, 127.0.0.1, localhost, ::1, got"),
+    ],
+)
+def test_address_elsewhere_or_none_is_refused(address: str, said: str) -> None:
+    with pytest.raises(ConfigError) as caught:
+        live.checked(address)
+    assert str(caught.value).startswith(said)
+
+
+def test_nobody_listening_is_one_line(shell: Shell) -> None:
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        address = f"127.0.0.1:{free.getsockname()[1]}"
+    said = shell.refused("run", "short.toml", "--live-at", address)
+    assert said.startswith(f"no Rerun viewer listens at {address}: ")
+
+
+def test_no_screen_is_one_line(shell: Shell, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("sys.platform", "linux")
+    monkeypatch.delenv("DISPLAY", raising=False)
+    monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
+    said = shell.refused("run", "short.toml", "--live")
+    assert said.startswith("no screen here: neither DISPLAY nor WAYLAND_DISPLAY is set; --live-at")
+
+
+def test_trouble_while_sending_reaches_the_caller(
+    kept: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(*args: object) -> None:
+        raise OSError("no room")
+
+    monkeypatch.setattr("fivebar_sim.recording.send_series", fail)
+    plan = rollout.plan(Scenario.load("classic-ellipse", ["duration=0.9"]))
+    with pytest.raises(OSError, match="no room"), live.streaming(plan, "127.0.0.1:9876") as watch:
+        rollout.execute(plan, watch)
