@@ -173,8 +173,16 @@ class _Sender:
         planned, stream = self._planned, self._stream
         recording_layout.send(stream, recording_layout.contents(self._room, [look], [plots]))
         recording.log_room(stream, self._room)
+        text = f"# {planned.scenario.name}\n\nNo verdict yet: shown while it is simulated."
+        stream.log(recording_layout.SUMMARY, _markdown(text), static=True)
         scene.log_leg(stream, planned.scenario.leg, look)
         foot.log_foot(stream, planned.motion.foot[1:], look)
+
+
+def _markdown(text: str) -> rr.TextDocument:
+    import rerun as rr
+
+    return rr.TextDocument(text, media_type="text/markdown")
 
 
 def _room(planned: Plan) -> Stage:
