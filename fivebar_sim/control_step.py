@@ -6,8 +6,10 @@ Whoever drives a leg in the loop, a scenario's controller or an agent, observes 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import cast
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fivebar_sim.arrays import Array
 from fivebar_sim.checks import LARGEST, check_number
@@ -15,6 +17,13 @@ from fivebar_sim.control import Drive, Observation
 from fivebar_sim.errors import ArgumentError
 from fivebar_sim.sensors import Sensors
 from fivebar_sim.servo import Servo
+from fivebar_sim.stacked import stacked
+
+DRAWN = 64
+"""Control steps whose noise is drawn in one go; the numbers are those of one by one."""
+
+Steps = int | NDArray[np.int64]
+"""A step that all legs are at, or that of each leg, (nsim,)."""
 
 
 def whole_steps(name: str, seconds: float, timestep: float) -> int:
@@ -33,13 +42,13 @@ def whole_steps(name: str, seconds: float, timestep: float) -> int:
 
 
 class ControlStep:
-    """Observations and commands of legs of one servo and one set of sensors.
+    """Observations and commands of legs of one set of sensors and one servo, or one each.
 
     A control step at k, every `every` timesteps, is `observe(k)`, then `send(k, command)`; the
-    steps that follow are reported to `moved`.
+    steps that follow are reported to `moved`. Legs that `restart` are at other steps than the rest.
 
     Args:
-        servo: Of all the legs.
+        servo: Of all the legs, or one each; then they differ in gains, bus and delay alone.
         sensors: Of all the legs.
         drive: What the commands are.
         timestep: h [s].
@@ -51,7 +60,7 @@ class ControlStep:
 
     def __init__(
         self,
-        servo: Servo,
+        servo: Servo | Sequence[Servo],
         sensors: Sensors,
         drive: Drive,
         *,
@@ -61,36 +70,76 @@ class ControlStep:
         start: Array,
         seeds: Sequence[int],
     ) -> None:
+        nsim = len(start)
+        servos = [servo] * nsim if isinstance(servo, Servo) else list(servo)
         self.every = every
-        self._servo, self._sensors, self._drive, self._h = servo, sensors, drive, timestep
+        self._servo, self._sensors, self._drive, self._h = (
+            stacked(servos, 2),
+            sensors,
+            drive,
+            timestep,
+        )
         late = round(min(sensors.delay / timestep, steps))  # later, only the start would be seen
-        self._theta = np.repeat(start[:, None], late + 1, axis=1)
+        self._theta = np.empty((nsim, late + 1, 2))
         self._theta_dot = np.zeros_like(self._theta)
-        self._noise = [np.random.default_rng(seed) for seed in seeds]
-        self._latched = servo.latched(steps, timestep)
-        rest = start if drive == "position" else np.zeros_like(start)
-        self._commands = np.empty((len(start), steps + 1, 2))
-        self._commands[:, -1] = rest  # row -1: before the first command has arrived
+        self._noisy = sensors.noise > 0.0 or sensors.rate_noise > 0.0
+        self._noise = [np.random.default_rng(0)] * nsim
+        self._drawn = np.empty((nsim, DRAWN if self._noisy else 0, 2, 2))
+        self._used = np.zeros(nsim, dtype=np.int64)
+        self._legs = np.arange(nsim)
+
+        buses = list(dict.fromkeys((s.rate, s.delay) for s in servos))
+        self._bus = np.array([buses.index((s.rate, s.delay)) for s in servos])
+        firsts = [next(s for s in servos if (s.rate, s.delay) == bus) for bus in buses]
+        self._latched = np.stack([s.latched(steps, timestep) for s in firsts])
+        age = np.arange(steps) // every - self._latched // every
+        self._depth = 1 + int(age.max(initial=0, where=self._latched >= 0))
+        self._prompt = self._depth == 1 and bool((self._latched >= 0).all())
+        self._commands = np.empty((nsim, self._depth + 1, 2))  # the last: before one has arrived
+        self.restart(self._legs, start, seeds)
+
+    def restart(self, rows: NDArray[np.int64], start: Array, seeds: Sequence[int]) -> None:
+        """Put some legs back to step 0.
+
+        Args:
+            rows: Which, (n,).
+            start: (theta_A, theta_E) at rest [rad], (n, 2).
+            seeds: Of their noise, (n,).
+        """
+        self._theta[rows] = start[:, None]
+        self._theta_dot[rows] = 0.0
+        self._commands[rows, -1] = start if self._drive == "position" else 0.0
+        if self._noisy:
+            for row, seed in zip(rows.tolist(), seeds, strict=True):
+                self._noise[row] = np.random.default_rng(seed)
+            self._used[rows] = DRAWN
 
     def moved(self, theta: Array, theta_dot: Array) -> None:
         """Take note of the motor angles [rad] and rates [rad/s] of the last steps, (nsim, n, 2)."""
-        keep = self._theta.shape[1]
-        self._theta = np.concatenate([self._theta, theta], axis=1)[:, -keep:]
-        self._theta_dot = np.concatenate([self._theta_dot, theta_dot], axis=1)[:, -keep:]
+        self._theta, self._theta_dot = _last(self._theta, theta), _last(self._theta_dot, theta_dot)
 
-    def observe(self, k: int) -> Observation:
-        """Return what is seen at step k."""
-        sensors = self._sensors
+    def observe(self, k: Steps) -> Observation:
+        """Return what is seen at step k; the time is (nsim,) if k is."""
+        sensors, time = self._sensors, cast(float, k * self._h)
         theta, theta_dot = self._theta[:, 0], self._theta_dot[:, 0]
-        if sensors.noise > 0.0 or sensors.rate_noise > 0.0:
-            drawn = np.stack([rng.standard_normal((2, 2)) for rng in self._noise])
+        if self._noisy:
+            drawn = self._draw()
             theta = theta + sensors.noise * drawn[:, 0]
             theta_dot = theta_dot + sensors.rate_noise * drawn[:, 1]
         if sensors.resolution > 0.0:
             theta = np.round(theta / sensors.resolution) * sensors.resolution
-        return Observation(k * self._h, theta, theta_dot)
+        return Observation(time, theta, theta_dot)
 
-    def send(self, k: int, command: Array) -> Array:
+    def _draw(self) -> Array:
+        """Return the next numbers of each leg's noise, (nsim, 2, 2)."""
+        for row in np.flatnonzero(self._used == DRAWN).tolist():
+            self._drawn[row] = self._noise[row].standard_normal((DRAWN, 2, 2))
+            self._used[row] = 0
+        drawn = self._drawn[self._legs, self._used]
+        self._used += 1
+        return drawn
+
+    def send(self, k: Steps, command: Array) -> Array:
         """Return what reaches the motors in each step until the next control step, (nsim, n, 2).
 
         A torque goes through a driver that makes up for the back-EMF it measures, so that the
@@ -100,9 +149,26 @@ class ControlStep:
             k: The step.
             command: (A, E) [rad or N m], (nsim, 2).
         """
-        stop = min(k + self.every, self._commands.shape[1] - 1)
-        self._commands[:, k:stop] = command[:, None]
-        sent = self._commands[:, self._latched[k:stop]]
+        sent = self._arriving(k, command)
         if self._drive == "position":
             return self._servo.rounded(sent)
         return sent + self._servo.back_emf * self._theta_dot[:, -1:]
+
+    def _arriving(self, k: Steps, command: Array) -> Array:
+        """Return the commands that have come over the bus, after the newest is sent, as `send`."""
+        n = min(self.every, self._latched.shape[1] - int(np.max(k)))
+        if self._prompt:
+            return np.repeat(command[:, None], n, axis=1)
+        at = np.broadcast_to(k, len(command))
+        self._commands[self._legs, at // self.every % self._depth] = command
+        row = self._latched[self._bus[:, None], at[:, None] + np.arange(n)]
+        slot = np.where(row < 0, self._depth, row // self.every % self._depth)
+        return self._commands[self._legs[:, None], slot]
+
+
+def _last(before: Array, new: Array) -> Array:
+    """Return as many of the last steps as there were before, (nsim, n, 2), in memory of its own."""
+    keep = before.shape[1]
+    if new.shape[1] >= keep:
+        return new[:, new.shape[1] - keep :].copy()
+    return np.concatenate([before[:, new.shape[1] :], new], axis=1)

@@ -42,6 +42,10 @@ PURE = (
     "sensors",
     "servo",
     "control_step",
+    "tasks",
+    "episodes",
+    "stacked",
+    "loop",
 )
 HEAVY = {"mujoco", "rerun", "matplotlib", "scipy"}
 

@@ -1,0 +1,197 @@
+"""Episodes of many legs at one task: actions in, observations, rewards and ends out; no physics.
+
+Whoever steps the physics, `mujoco.batch` or dm_control, asks `commands`, reports with `moved`, and
+reads `outcome`. Nothing here is done leg by leg but what a restart draws.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fivebar_sim.arrays import Array, Bools, as_vectors
+from fivebar_sim.control_step import ControlStep
+from fivebar_sim.errors import ArgumentError
+from fivebar_sim.servo import applied_torque
+from fivebar_sim.stacked import stacked
+from fivebar_sim.tasks.base import Part, Task
+from fivebar_sim.tasks.motion import TIME, motion
+
+MOTORS = [-4, -2]
+"""Where qpos and qvel have A and E."""
+
+SPEED_LIMIT = 1e4
+"""Joint rate beyond which the physics has broken down [rad/s], as in `simulate`."""
+
+
+class Outcome(NamedTuple):
+    """What agents get after a control period, or at the start of an episode.
+
+    Attributes:
+        observation: (n, size).
+        reward: Weighted sum of the terms, (n,).
+        terms: By name, (n,) each.
+        terminated: Whether a leg is beyond what it may do, (n,).
+        truncated: Whether the episode's duration is over, (n,).
+        reason: Number in REASONS, (n,).
+    """
+
+    observation: Array
+    reward: Array
+    terms: dict[str, Array]
+    terminated: Bools
+    truncated: Bools
+    reason: NDArray[np.int64]
+
+
+class Episodes:
+    """Episodes of legs.
+
+    Args:
+        task: What they shall do; scales, bounds and targets are those of its leg.
+        drawn: The same task with each leg's own numbers, n.
+        starts: Poses at rest that an episode may start in, of each leg, (n, m, nq).
+
+    Attributes:
+        size: n.
+        low, high: Bounds of an action.
+        qpos, qvel: The state of each leg, (n, nq).
+    """
+
+    def __init__(self, task: Task, drawn: Sequence[Task], starts: Array) -> None:
+        self.task, self.size = task, len(drawn)
+        self.low, self.high = task.bounds
+        self._leg = stacked([each.leg for each in drawn], 1)
+        servos = [each.servo for each in drawn]
+        self._servo = stacked(servos, 2)
+        self._lead = stacked(servos, 1)
+        self._starts = starts
+        self._targets = np.concatenate(list(task.targets().values()), axis=1)
+        self._weights = {name: task.weight(name) for name in task.WEIGHTS}
+        self.qpos, self.qvel = starts[:, 0].copy(), np.zeros_like(starts[:, 0])
+        self._count = np.zeros(self.size, dtype=np.int64)
+        self._fresh = np.ones(self.size, dtype=bool)
+        self._broken = np.zeros(self.size, dtype=bool)
+        self._ctrl = np.zeros((self.size, task.every, 2))
+        self._torque = np.zeros_like(self._ctrl)
+        self._control = ControlStep(
+            servos,
+            task.sensors,
+            task.drive,
+            timestep=task.timestep,
+            every=task.every,
+            steps=task.periods * task.every,
+            start=self.qpos[:, MOTORS],
+            seeds=range(self.size),
+        )
+
+    def begin(self, rows: NDArray[np.int64], random: Sequence[np.random.Generator]) -> Array:
+        """Return qpos at which some legs begin an episode, at rest, (k, nq).
+
+        Args:
+            rows: Which, (k,).
+            random: Of each of them: the start and the sensors' noise are drawn from it.
+        """
+        which = [int(generator.integers(self._starts.shape[1])) for generator in random]
+        seeds = [int(generator.integers(2**63)) for generator in random]
+        qpos = self._starts[rows, which]
+        self.qpos[rows], self.qvel[rows] = qpos, 0.0
+        self._count[rows], self._fresh[rows], self._broken[rows] = 0, True, False
+        self._torque[rows] = 0.0
+        self._control.restart(rows, qpos[:, MOTORS], seeds)
+        return qpos
+
+    def checked(self, action: object, shape: tuple[int, ...]) -> Array:
+        """Return an action as it came, checked.
+
+        Raises:
+            ArgumentError: Not finite numbers of the shape within the bounds: nothing is clipped.
+        """
+        values = as_vectors(np.asarray(action), "action", len(self.low))
+        if values.shape != shape:
+            raise ArgumentError(f"action must have shape {shape}, got {values.shape}")
+        outside = ~((values >= self.low) & (values <= self.high))
+        if outside.any():
+            index = tuple(int(i) for i in np.argwhere(outside)[0])
+            name, unit, number = part_at(self.task.actions, index[-1])
+            low, high = self.low[index[-1]], self.high[index[-1]]
+            raise ArgumentError(
+                f"action {name}[{number}] must be in [{low:.6g}, {high:.6g}] {unit}, "
+                f"got {float(values[index])!r} at index {index}"
+            )
+        return values
+
+    def commands(self, action: Array) -> Array:
+        """Return what reaches the motors in each step of the next control period, (n, every, 2).
+
+        Args:
+            action: Checked, (n, size).
+        """
+        command = action
+        if self.task.action == "motion":
+            lead = self._lead.damping / self._lead.kp
+            command = action[:, :2] + lead * action[:, 2:]
+        periods = np.minimum(self._count, self.task.periods - 1)  # those that are over wait
+        self._ctrl = self._control.send(periods * self.task.every, command)
+        return self._ctrl
+
+    def moved(self, qpos: Array, qvel: Array, warnings: NDArray[Any]) -> None:
+        """Take note of the states after each step of a control period.
+
+        A leg whose physics broke down stays as it was a period before.
+
+        Args:
+            qpos: (n, every, nq).
+            qvel: (n, every, nq).
+            warnings: MuJoCo's, since the leg began, (n,).
+        """
+        sound = np.abs(qvel).max(axis=(1, 2)) < SPEED_LIMIT  # NaN is not
+        self._broken = ~(sound & np.isfinite(qpos).all(axis=(1, 2)) & (warnings == 0))
+        q, v = qpos[..., MOTORS], qvel[..., MOTORS]
+        if self._broken.any():
+            bad = self._broken[:, None, None]
+            qpos = np.where(bad, self.qpos[:, None], qpos)
+            qvel = np.where(bad, self.qvel[:, None], qvel)
+            q, v = qpos[..., MOTORS], qvel[..., MOTORS]
+        before = (
+            np.concatenate([self.qpos[:, None, MOTORS], q[:, :-1]], axis=1),
+            np.concatenate([self.qvel[:, None, MOTORS], v[:, :-1]], axis=1),
+        )
+        task = self.task
+        self._torque = applied_torque(
+            self._servo, task.integrator, self._ctrl, *before, q, v, task.drive
+        )
+        self._control.moved(q, v)
+        self.qpos, self.qvel = qpos[:, -1].copy(), qvel[:, -1].copy()
+        self._count += 1
+        self._fresh[:] = False
+
+    def outcome(self) -> Outcome:
+        """Return what agents get; of legs that have just begun, no reward and no end."""
+        task = self.task
+        now = motion(self._leg, self.qpos, self.qvel, self._torque, self._broken)
+        targets = self._targets[np.minimum(self._count, task.periods)]
+        seen = self._control.observe(self._count * task.every)
+        ran = ~self._fresh
+        terms = {name: term * ran for name, term in task.terms(now, targets).items()}
+        reward = np.zeros(self.size)
+        for name, term in terms.items():
+            reward += self._weights[name] * term
+        reason = now.reason * ran
+        terminated = reason > 0
+        truncated = ~terminated & (self._count >= task.periods)
+        reason[truncated] = TIME
+        observation = task.observation(seen, now, targets)
+        return Outcome(observation, reward, terms, terminated, truncated, reason)
+
+
+def part_at(parts: dict[str, Part], index: int) -> tuple[str, str, int]:
+    """Return name, unit and number within it of the part that holds an index."""
+    for name, part in parts.items():
+        if index < part.size:
+            return name, part.unit, index
+        index -= part.size
+    raise IndexError(index)

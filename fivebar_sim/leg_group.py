@@ -1,0 +1,154 @@
+"""Legs at one task on `mujoco.batch`: one of them is an environment, many a vector of them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from fivebar_sim import model, motion
+from fivebar_sim.arrays import Array
+from fivebar_sim.episodes import Episodes, Outcome
+from fivebar_sim.errors import ArgumentError, UnreachableError
+from fivebar_sim.paths import Step
+from fivebar_sim.scenes import Ground
+from fivebar_sim.simulate import Legs
+from fivebar_sim.tasks import Randomise, Task
+
+STARTS = 32
+"""Start poses of a leg; an episode draws one."""
+
+
+class LegGroup:
+    """Legs that are stepped together through episodes, each begun again after its end.
+
+    Args:
+        task: What they shall do.
+        seeds: Of what each leg draws from `randomise`, (n,).
+        randomise: Ranges of what differs between the legs; None is nothing.
+        nthread: Threads; 0 is one for every processor.
+
+    Attributes:
+        task: With its path spelt out.
+        drawn: The task with each leg's own numbers, n.
+        models: The legs' models, n.
+        episodes: What has become of them.
+
+    Raises:
+        UnreachableError: A leg cannot follow the path.
+    """
+
+    def __init__(
+        self,
+        task: Task,
+        seeds: Sequence[int],
+        randomise: Randomise | None = None,
+        nthread: int = 1,
+    ) -> None:
+        self.task = task.resolved()
+        self.drawn, self.models, starts = prepared(self.task, seeds, randomise)
+        self.episodes = Episodes(self.task, self.drawn, starts)
+        self._legs = _Legs(self.models, starts[:, 0], nthread)
+        self._over = np.zeros(len(seeds), dtype=bool)
+        self._random: list[np.random.Generator] = []
+
+    def reset(self, random: Sequence[np.random.Generator]) -> Outcome:
+        """Return the start of a new episode of every leg.
+
+        Args:
+            random: Of each leg, for this and the following episodes.
+        """
+        self._random = list(random)
+        self._begin(np.arange(self.episodes.size))
+        self._over[:] = False
+        return self.episodes.outcome()
+
+    def step(self, action: Array) -> Outcome:
+        """Return what came of an action; a leg whose episode was over begins a new one instead.
+
+        Args:
+            action: Checked, (n, size).
+        """
+        if not self._random:
+            raise ArgumentError("step comes after reset")
+        states = self._legs.advance(self.episodes.commands(action))
+        self.episodes.moved(states.qpos, states.qvel, states.warnings)
+        if self._over.any():
+            self._begin(np.flatnonzero(self._over))
+        outcome = self.episodes.outcome()
+        self._over = outcome.terminated | outcome.truncated
+        return outcome
+
+    def _begin(self, rows: NDArray[np.int64]) -> None:
+        random = [self._random[row] for row in rows.tolist()]
+        self._legs.restart(rows, self.episodes.begin(rows, random))
+
+
+class _Legs(Legs):
+    """Legs of which some are begun again."""
+
+    def restart(self, rows: NDArray[np.int64], qpos: Array) -> None:
+        """Put some legs at rest into poses (k, nq)."""
+        self._batch.reset(rows, stage=mujoco.mjtStage.mjSTAGE_NONE.value)
+        self._batch.qpos[rows] = qpos
+
+
+def prepared(
+    task: Task, seeds: Sequence[int], randomise: Randomise | None
+) -> tuple[list[Task], list[mujoco.MjModel], Array]:
+    """Return the drawn tasks, their models and their start poses (n, STARTS, nq).
+
+    Raises:
+        UnreachableError: A leg cannot follow the path; says the seed that it is drawn from.
+    """
+    if randomise is None:
+        one = model_of(task), starts(task)
+        return [task] * len(seeds), [one[0]] * len(seeds), np.repeat(one[1][None], len(seeds), 0)
+    drawn = [randomise.drawn(task, seed) for seed in seeds]
+    poses = []
+    for seed, each in zip(seeds, drawn, strict=True):
+        try:
+            poses.append(starts(each))
+        except UnreachableError as error:
+            raise UnreachableError(f"the leg drawn from seed {seed}: {error}") from None
+    return drawn, [model_of(each) for each in drawn], np.stack(poses)
+
+
+def model_of(task: Task) -> mujoco.MjModel:
+    """Return the model of a task's leg in its scene."""
+    return model.build(
+        task.leg,
+        servo=task.servo,
+        scene=task.scene,
+        timestep=task.timestep,
+        integrator=task.integrator,
+        drive=task.drive,
+    )
+
+
+def starts(task: Task) -> Array:
+    """Return poses at rest with the foot near the start of the task's path, (STARTS, nq).
+
+    They fill a disc of radius `spread` evenly, from the path's start outwards: a sunflower's seeds,
+    point i at spread sqrt(i / STARTS) in the direction i (3 - sqrt(5)) pi. On the ground the foot
+    is the task's drop above the floor.
+
+    Raises:
+        UnreachableError: The leg cannot follow the path, or reach all of that disc.
+    """
+    steps = task.periods * task.every
+    wanted = motion.plan(task.leg, task.foot_path, steps, task.timestep)
+    i = np.arange(STARTS)
+    angle, away = i * (3.0 - np.sqrt(5.0)) * np.pi, task.spread * np.sqrt(i / STARTS)
+    feet = wanted.foot[0] + away[:, None] * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+    q = np.tile(wanted.q[0], (STARTS, 1))
+    if task.spread > 0.0:
+        for row, (x, z) in enumerate(feet[1:].tolist(), start=1):
+            hold = Step(start=(x, z), stop=(x, z), lift=0.0, seconds=1.0)
+            q[row] = motion.plan(task.leg, hold, 1, task.timestep).q[0]
+    if not isinstance(task.scene, Ground):
+        return q
+    height = [model.standing(task.leg, pose) + task.scene.drop for pose in q]
+    return np.concatenate([np.array(height)[:, None], q], axis=1)

@@ -1,0 +1,71 @@
+"""Pictures of a leg that is somewhere, without a run or a screen."""
+
+from __future__ import annotations
+
+import weakref
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from fivebar_sim import gl
+from fivebar_sim.arrays import Array
+from fivebar_sim.errors import ConfigError
+from fivebar_sim.geometry import FiveBar
+
+WIDTH, HEIGHT = 640, 480
+GEOMS = 200
+"""Room of a scene."""
+FAR, DOWN = 3.5, -9.0
+"""Where the camera is: distance from the hip in leg sizes, and elevation [degrees]."""
+
+
+class LegPicture:
+    """What takes pictures of a leg: a GL context, a scene and its camera.
+
+    Args:
+        model: The leg's.
+        leg: The leg.
+
+    Raises:
+        ConfigError: There is no GL here.
+    """
+
+    def __init__(self, model: mujoco.MjModel, leg: FiveBar) -> None:
+        self._model, self._data = model, mujoco.MjData(model)
+        self._size, self._rect = leg.size, mujoco.MjrRect(0, 0, WIDTH, HEIGHT)
+        self._scene = mujoco.MjvScene(model, GEOMS)
+        self._option, self._camera = mujoco.MjvOption(), mujoco.MjvCamera()
+        self._camera.type = mujoco.mjtCamera.mjCAMERA_FREE
+        self._camera.azimuth, self._camera.elevation = 90.0, DOWN
+        self._camera.distance = FAR * leg.size
+        self._gl = gl.context(gl.find(), WIDTH, HEIGHT)
+        self._freed = weakref.finalize(self, self._gl.free)  # at the latest before Python ends
+        try:
+            self._gl.make_current()
+            self._mjr = mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_100)
+        except mujoco.FatalError as error:
+            self._freed()
+            raise ConfigError(f"cannot draw {WIDTH} x {HEIGHT} pixels here: {error}") from None
+        mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN, self._mjr)
+
+    def taken(self, qpos: Array) -> NDArray[np.uint8]:
+        """Return the picture of a pose (nq,), (HEIGHT, WIDTH, 3)."""
+        self._data.qpos[:] = qpos
+        mujoco.mj_kinematics(self._model, self._data)
+        mujoco.mj_camlight(self._model, self._data)
+        self._camera.lookat[:] = self._data.body("hip").xpos - (0.0, 0.0, 0.4 * self._size)
+        every = mujoco.mjtCatBit.mjCAT_ALL
+        mujoco.mjv_updateScene(
+            self._model, self._data, self._option, None, self._camera, every, self._scene
+        )
+        self._gl.make_current()
+        mujoco.mjr_render(self._rect, self._scene, self._mjr)
+        pixels = np.empty((HEIGHT, WIDTH, 3), np.uint8)
+        mujoco.mjr_readPixels(pixels, None, self._rect, self._mjr)
+        return np.ascontiguousarray(pixels[::-1])  # GL's rows go up
+
+    def close(self) -> None:
+        """Let go of the GL context."""
+        self._mjr.free()
+        self._freed()

@@ -1,0 +1,265 @@
+"""What every task has: a leg and how it is driven, actions, observations, rewards, an end."""
+
+from __future__ import annotations
+
+from typing import ClassVar, Literal, NamedTuple, Self, get_args
+
+import msgspec
+import numpy as np
+
+from fivebar_sim import kinematics
+from fivebar_sim.arrays import Array
+from fivebar_sim.checks import check_number
+from fivebar_sim.control import Observation
+from fivebar_sim.control_step import whole_steps
+from fivebar_sim.errors import ArgumentError, ConfigError, unknown
+from fivebar_sim.geometry import FiveBar
+from fivebar_sim.paths import FootPath, Gait
+from fivebar_sim.scenes import Ground, Scene
+from fivebar_sim.sensors import Sensors
+from fivebar_sim.servo import Drive, Integrator, Servo
+from fivebar_sim.tasks.motion import Motion
+
+Action = Literal["position", "motion", "torque"]
+ACTIONS: tuple[str, ...] = get_args(Action)
+
+FASTEST = 40.0
+"""Bound of rate setpoints where the servo has no no-load speed [rad/s]."""
+
+LONGEST = 1000.0
+"""Upper end of a duration [s]."""
+
+WIDEST = float(np.pi)
+"""Upper end of the span of setpoints [rad]."""
+
+
+class Part(NamedTuple):
+    """A named part of an observation or an action.
+
+    Attributes:
+        size: How many numbers.
+        unit: "" for pure numbers.
+    """
+
+    size: int
+    unit: str
+
+
+class Task(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True, tag_field="kind"):
+    """A task; the base of every kind.
+
+    An episode starts at rest near the start of the foot path; the targets at a control step are
+    those of its time.
+
+    Attributes:
+        leg: The leg.
+        servo: The servos at A and E.
+        sensors: What is seen of their angles and rates; all else that is seen is exact.
+        path: The foot's path, at whose start the foot starts; None is the kind's own for the leg.
+        action: "position" setpoints (A, E) [rad]; "motion": with rates after them [rad/s], as
+            theta + (damping / kp) theta_dot, which takes the servo's lag out; "torque" [N m].
+        span: How far position setpoints may be from the rest pose [rad].
+        spread: How far the foot may start from the path's start [m].
+        period: Of control [s], a whole number of timesteps.
+        duration: Of an episode [s], a whole number of periods.
+        timestep: h of the physics [s].
+        integrator: MuJoCo's, "discrete" or "implicitfast".
+        weights: Of reward terms, where they are not those of `WEIGHTS`.
+    """
+
+    WEIGHTS: ClassVar[dict[str, float]] = {}
+    """The reward terms with their weights."""
+    TARGETS: ClassVar[dict[str, Part]] = {}
+    """The observation's parts that are known before the episode."""
+    GROUNDED: ClassVar[bool] = False
+
+    leg: FiveBar = FiveBar(name="classic")
+    servo: Servo = Servo()
+    sensors: Sensors = Sensors()
+    path: FootPath | None = None
+    action: Action = "position"
+    span: float = 1.0
+    spread: float = 0.002
+    period: float = 0.005
+    duration: float = 4.0
+    timestep: float = 0.001
+    integrator: Integrator = "discrete"
+    weights: dict[str, float] = {}
+
+    def __post_init__(self) -> None:
+        if self.action not in ACTIONS:
+            raise ArgumentError(unknown("action", str(self.action), ACTIONS))
+        if self.action == "torque" and self.servo.limit is None:
+            raise ArgumentError("action 'torque' needs a servo with a limit: its bounds [N m]")
+        if self.integrator not in get_args(Integrator):
+            raise ArgumentError(unknown("integrator", str(self.integrator), get_args(Integrator)))
+        check_number("span", self.span, "rad", low=0.0, high=WIDEST, strict=True)
+        check_number("spread", self.spread, "m", low=0.0, high=self.leg.size)
+        check_number("timestep", self.timestep, "s", low=0.0, strict=True)
+        whole_steps("period", self.period, self.timestep)
+        check_number("duration", self.duration, "s", low=0.0, high=LONGEST, strict=True)
+        periods = round(self.duration / self.period)
+        if periods < 1 or abs(periods * self.period - self.duration) > 1e-6 * self.duration:
+            raise ArgumentError(
+                f"duration must be a whole number of periods of {self.period:g} s, "
+                f"got {self.duration!r} s"
+            )
+        for name, weight in self.weights.items():
+            if name not in self.WEIGHTS:
+                raise ArgumentError(unknown("reward term", name, self.WEIGHTS))
+            check_number(f"weights.{name}", weight, "")
+
+    @property
+    def kind(self) -> str:
+        """Its name."""
+        return str(self.__struct_config__.tag)
+
+    @property
+    def every(self) -> int:
+        """Timesteps of a control period."""
+        return round(self.period / self.timestep)
+
+    @property
+    def periods(self) -> int:
+        """Control periods of an episode."""
+        return round(self.duration / self.period)
+
+    @property
+    def times(self) -> Array:
+        """The times of an episode's control steps, its end included [s], (periods + 1,)."""
+        return np.arange(self.periods + 1, dtype=np.float64) * self.period
+
+    @property
+    def drive(self) -> Drive:
+        """What the motors are sent."""
+        return "torque" if self.action == "torque" else "position"
+
+    @property
+    def home(self) -> Array:
+        """The foot in the leg's rest pose [m], hip frame, (2,)."""
+        return kinematics.chain_points(self.leg, kinematics.home(self.leg)).F
+
+    @property
+    def scene(self) -> Scene:
+        """What the leg hangs on and stands on."""
+        raise NotImplementedError
+
+    @property
+    def foot_path(self) -> FootPath:
+        """The path, the kind's own where none was given."""
+        raise NotImplementedError
+
+    def resolved(self) -> Self:
+        """Return the task with its path spelt out, whatever its leg becomes."""
+        return msgspec.structs.replace(self, path=self.foot_path)
+
+    @property
+    def actions(self) -> dict[str, Part]:
+        """The parts of an action, in order."""
+        if self.action == "torque":
+            return {"torque": Part(2, "N m")}
+        parts = {"theta": Part(2, "rad")}
+        return parts if self.action == "position" else {**parts, "theta_dot": Part(2, "rad/s")}
+
+    @property
+    def bounds(self) -> tuple[Array, Array]:
+        """The least and the greatest legal action, (2,), with rates (4,)."""
+        if self.action == "torque":
+            assert self.servo.limit is not None
+            return np.full(2, -self.servo.limit), np.full(2, self.servo.limit)
+        rest = kinematics.home(self.leg)[::2]
+        low, high = rest - self.span, rest + self.span
+        if self.action == "position":
+            return low, high
+        fastest = np.full(2, self.servo.speed or FASTEST)
+        return np.concatenate([low, -fastest]), np.concatenate([high, fastest])
+
+    @property
+    def parts(self) -> dict[str, Part]:
+        """The parts of an observation, in order."""
+        parts = {
+            "theta": Part(2, "rad"),
+            "theta_dot": Part(2, "rad/s"),
+            "foot": Part(2, "m"),
+            "foot_dot": Part(2, "m/s"),
+        }
+        if self.GROUNDED:
+            parts |= {
+                "hip_z": Part(1, "m"),
+                "hip_dot_z": Part(1, "m/s"),
+                "contact": Part(1, ""),
+            }
+        return {**parts, **self.TARGETS}
+
+    def targets(self) -> dict[str, Array]:
+        """Return the parts TARGETS at each control step, (periods + 1, size)."""
+        raise NotImplementedError
+
+    def observation(self, seen: Observation, now: Motion, targets: Array) -> Array:
+        """Return the observations of legs, their parts one after the other, (n, size).
+
+        Args:
+            seen: What their sensors say.
+            now: What they are doing.
+            targets: The parts TARGETS, joined, (n, size of them).
+        """
+        ground = [now.hip, now.contact[:, None]] if self.GROUNDED else []
+        return np.concatenate(
+            [seen.theta, seen.theta_dot, now.foot, now.foot_dot, *ground, targets], axis=1
+        )
+
+    def terms(self, now: Motion, targets: Array) -> dict[str, Array]:
+        """Return the reward terms WEIGHTS of a control period, (n,) each; see `observation`."""
+        raise NotImplementedError
+
+    def weight(self, name: str) -> float:
+        """Return the weight of a reward term."""
+        return self.weights.get(name, self.WEIGHTS[name])
+
+
+class Grounded(Task, frozen=True):
+    """A task on the ground; the hip rides on a rail.
+
+    Attributes:
+        mass: Of the trunk that rides on the hip [kg].
+        friction: Coulomb's coefficient between foot and floor.
+        drop: Height of the foot above the floor at the start [m].
+    """
+
+    GROUNDED: ClassVar[bool] = True
+
+    mass: float = 0.5
+    friction: float = 1.0
+    drop: float = 0.0
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        Ground(mass=self.mass, friction=self.friction, drop=self.drop)  # checks them
+
+
+def effort(now: Motion) -> Array:
+    """Return the mean square of both motors' torque over the control period [N^2 m^2], (n,)."""
+    return np.einsum("nkj,nkj->n", now.torque, now.torque) / now.torque.shape[1]
+
+
+def near(error: Array, scale: float) -> Array:
+    """Return exp(-|error|^2 / scale^2) of vectors (n, k): 1 where it is zero, (n,)."""
+    return np.exp(-np.einsum("nk,nk->n", error, error) / scale**2)
+
+
+def turning(cycle: Array) -> Array:
+    """Return (cos, sin) of a clock's cycles, (..., 2)."""
+    angle = 2.0 * np.pi * cycle
+    return np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+
+
+def periodic(path: FootPath, time: Array) -> Array:
+    """Return (cos, sin) of where in its period a path is, (..., 2).
+
+    Raises:
+        ConfigError: A path without a period.
+    """
+    if path.period is None:
+        kind = path.__struct_config__.tag
+        raise ConfigError(f"the path must be a periodic one, for its phase; got kind {kind!r}")
+    return turning(path.cycle(time) if isinstance(path, Gait) else time / path.period)

@@ -1,0 +1,68 @@
+"""The task to hop on the spot."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+import numpy as np
+
+from fivebar_sim.arrays import Array
+from fivebar_sim.checks import check_number
+from fivebar_sim.paths import FootPath
+from fivebar_sim.paths.base import FASTEST
+from fivebar_sim.scenes import Rail, Scene
+from fivebar_sim.tasks.base import Grounded, Part, effort, turning
+from fivebar_sim.tasks.motion import Motion
+from fivebar_sim.tasks.stand import held
+
+
+class Hop(Grounded, frozen=True, tag="hop"):
+    """Bring the foot high above the floor, on the rail, again and again.
+
+        flight = min(height / target, 1) where the foot is above the floor, else 0
+        effort = mean |tau|^2
+
+    The phase is that of a clock which the agent may hop by. Its own path holds the foot in a
+    crouch, 0.16 size above the rest pose.
+
+    Attributes:
+        target: Height of the foot's ball above the floor that is rewarded in full [m]; None is
+            0.3 size.
+        frequency: Of the clock [Hz].
+    """
+
+    WEIGHTS: ClassVar[dict[str, float]] = {"flight": 1.0, "effort": -0.5}
+    TARGETS: ClassVar[dict[str, Part]] = {"target": Part(1, "m"), "phase": Part(2, "")}
+
+    target: float | None = None
+    frequency: float = 2.0
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        check_number("frequency", self.frequency, "Hz", low=0.0, high=FASTEST, strict=True)
+        if self.target is not None:
+            size = self.leg.size
+            check_number("target", self.target, "m", low=0.0, high=10.0 * size, strict=True)
+
+    @property
+    def scene(self) -> Scene:
+        """The rail."""
+        return Rail(mass=self.mass, friction=self.friction, drop=self.drop)
+
+    @property
+    def foot_path(self) -> FootPath:
+        """The path, or the crouch."""
+        return self.path or held(self.home + np.array([0.0, 0.16 * self.leg.size]))
+
+    def targets(self) -> dict[str, Array]:
+        """Return the target height and the clock's phase at each control step."""
+        time = self.times
+        target = 0.3 * self.leg.size if self.target is None else self.target
+        return {"target": np.full((len(time), 1), target), "phase": turning(time * self.frequency)}
+
+    def terms(self, now: Motion, targets: Array) -> dict[str, Array]:
+        """Return the reward terms, (n,) each."""
+        return {
+            "flight": np.clip(now.height / targets[:, 0], 0.0, 1.0),
+            "effort": effort(now),
+        }
