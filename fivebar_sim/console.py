@@ -9,11 +9,13 @@ from typing import TYPE_CHECKING
 from rich import box
 from rich.console import Console
 from rich.markup import escape
+from rich.measure import Measurement
 from rich.table import Table
 
 from fivebar_sim.metrics import Limit, look_up
 
 if TYPE_CHECKING:
+    from fivebar_sim.regression import Checked, Row
     from fivebar_sim.rollout import Result
 
 SHOWN = {
@@ -56,6 +58,9 @@ DETAILS = ("load.work", "load.opposing", "load.peak_ratio", "load.rms_ratio", "l
 
 SMALLER = {"mm": "um", "um": "nm"}
 """The unit a thousand times smaller, for values that would have two zeros behind the point."""
+
+WIDEST = 300
+"""Columns of a table that goes into a file or a pipe, at most; there it takes what it needs."""
 
 
 def shown(key: str, value: float | None) -> str:
@@ -110,28 +115,40 @@ def _matters(key: str, result: Result) -> bool:
     return not key.startswith(DETAILS)
 
 
-def print_check(results: Sequence[Result], console: Console) -> None:
-    """Print the limits of many runs as one table, the name of each run above its limits."""
-    table = _table(
-        "foot tracking and load against their limits", ("metric", "limit", "now", "verdict")
-    )
-    for result in results:
-        table.add_row(f"[bold]{escape(result.scenario.name)}[/bold]")
-        for limit in result.limits:
-            label, now = SHOWN[limit.key][0], shown(limit.key, limit.value)
-            table.add_row(f"  {label}", bounds(limit), now, verdict(limit.ok))
-        flips = result.metrics["branch"]["flips"]
-        if flips:
-            table.add_row("  branch flips", "none", str(flips), verdict(False))
-        if not result.limits and not flips:
-            table.add_row("  no limits set", "", "", verdict(True))
-    console.print(table)
+def print_check(checked: Sequence[Checked], console: Console) -> None:
+    """Print many runs as one table, the name of each above its metrics; then what stands out."""
+    columns = ("metric", "limit", "baseline", "now", "change", "verdict")
+    table = _table("foot tracking and load against limits and baselines", columns, gap=0)
+    for each in checked:
+        table.add_row(f"[bold]{escape(each.name)}[/bold]")
+        for row in each.rows:
+            then = shown(row.key, row.recorded.value) if row.recorded else ""
+            limit = bounds(row.limit) if row.limit else ""
+            now = shown(row.key, row.now)
+            table.add_row(f" {SHOWN[row.key][0]}", limit, then, now, row.change, _word(row))
+        if each.broke:
+            table.add_row(" run", *[""] * 4, verdict(False))
+        elif not each.rows:
+            table.add_row(" no limits set", *[""] * 4, verdict(True))
+    options = console.options.update(max_width=WIDEST)
+    wide = None if console.is_terminal else Measurement.get(console, options, table).maximum
+    console.print(table, width=wide, crop=False)
+    for each in checked:
+        failures = [(verdict(False), line) for line in each.failures]
+        for word, line in [*failures, *(("note", line) for line in each.remarks)]:
+            console.print(f"{word}: {escape(each.name)}: {escape(line)}", soft_wrap=True)
 
 
-def _table(title: str, columns: Sequence[str]) -> Table:
+def _word(row: Row) -> str:
+    """Return the word for a metric's verdict, coloured for a terminal."""
+    plain = row.verdict in ("pass", "FAIL")
+    return verdict(row.verdict == "pass") if plain else f"[cyan]{row.verdict}[/cyan]"
+
+
+def _table(title: str, columns: Sequence[str], gap: int = 1) -> Table:
     """Return an empty table; numbers stand to the right, and nothing wraps at 80 columns."""
-    table = Table(title=title, box=box.SIMPLE_HEAD, title_justify="left", padding=(0, 1, 0, 0))
+    table = Table(title=title, box=box.SIMPLE_HEAD, title_justify="left", padding=(0, gap, 0, 0))
     for column in columns:
-        number = column in ("value", "limit", "now")
+        number = column in ("value", "limit", "baseline", "now", "change")
         table.add_column(column, justify="right" if number else "left", no_wrap=True)
     return table

@@ -72,18 +72,6 @@ def test_failing_limit_exits_1_and_still_writes(shell: Shell) -> None:
     assert "FAIL" in checked.out
 
 
-def test_check_shows_every_limit_and_writes_nothing(shell: Shell) -> None:
-    before = shell.names()
-    said = shell("check")
-    assert said.status == 0
-    for name in ("classic-ellipse", "classic-figure-eight", "q8bot-trot"):
-        assert name in said.out
-    assert "pass" in said.out
-    assert "FAIL" not in said.out
-    assert shell.names() == before
-    assert "no limits set" in shell("check", "short.toml").out
-
-
 def test_highest_status_counts(shell: Shell) -> None:
     Path("wild.toml").write_text(
         ELLIPSE.replace("short", "wild") + "[sim]\nintegrator='implicitfast'\ntimestep=0.02\n",

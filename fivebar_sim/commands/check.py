@@ -2,28 +2,141 @@
 
 from __future__ import annotations
 
-from fivebar_sim.commands.common import FAILED, Scenarios, Settings, plans_of, say, screen, working
-from fivebar_sim.errors import DivergedError
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from tyro.conf import arg
+
+from fivebar_sim.commands.common import (
+    FAILED,
+    WRONG,
+    Scenarios,
+    Settings,
+    plans_of,
+    say,
+    screen,
+    working,
+)
+from fivebar_sim.errors import ConfigError, DivergedError, RunDirectoryError
+
+if TYPE_CHECKING:
+    from fivebar_sim.baseline import Baseline
+    from fivebar_sim.regression import Checked
+    from fivebar_sim.rollout import Plan, Result
 
 
-def check(scenarios: Scenarios = (), /, *, settings: Settings = (), quiet: bool = False) -> int:
-    """Run scenarios against their limits; exit status 1 if any limit is broken.
+def check(
+    scenarios: Scenarios = (),
+    /,
+    *,
+    settings: Settings = (),
+    update: bool = False,
+    junit: Annotated[Path | None, arg(metavar="FILE")] = None,
+    summary: Annotated[Path | None, arg(metavar="FILE")] = None,
+    keep: Annotated[Path, arg(metavar="DIR")] = Path("runs/failed"),
+    quiet: bool = False,
+) -> int:
+    """Run scenarios against their limits and baselines; exit status 1 if any is broken.
+
+    A baseline is baselines/NAME.json beside the scenario's file: what the metrics were, and how far
+    each may move. A metric that got worse than that fails; one that got better is reported.
 
     Args:
         scenarios: Names of shipped scenarios or paths of TOML files; none: all that ship.
         settings: Change one key of every scenario, as sim.timestep=0.0005; repeats.
+        update: Record what is measured as the new baselines, of all runs that keep their limits.
+        junit: Write the verdicts as JUnit XML.
+        summary: Append them as Markdown, for the page of a CI job ("$GITHUB_STEP_SUMMARY").
+        keep: Where the run directories of failed scenarios go, DIR/NAME; one that is there already
+            is replaced when its scenario fails again, and never deleted.
         quiet: Print nothing but errors.
     """
-    from fivebar_sim import console, rollout
+    from fivebar_sim import baseline, check_report, console, resources, whole_file
 
-    status, results = 0, []
-    for planned in plans_of(scenarios, settings):
-        try:
-            with working(f"checking {planned.scenario.name}", quiet=quiet):
-                results.append(rollout.execute(planned))
-        except DivergedError as error:
-            say(error)
-            status = FAILED
+    if update and settings:
+        raise ConfigError("--update records scenarios as their files say: leave out --set")
+    sources = scenarios or tuple(resources.shipped("scenarios"))
+    plans = plans_of(sources, settings)
+    _check_names(plans)
+    places = [baseline.place(source) for source in sources]
+    olds = [baseline.read(place) for place in places]
+    with working(f"checking {len(plans)} scenarios", quiet=quiet):
+        results = _results(plans)
+    checked = [_judge(*each) for each in zip(plans, results, olds, strict=True)]
+    if update:
+        checked = [_update(*each) for each in zip(checked, results, olds, places, strict=True)]
+    status = max(_keep(each, result, keep) for each, result in zip(checked, results, strict=True))
     if not quiet:
-        console.print_check(results, screen())
-    return max([status, *(0 if r.verdict == "pass" else FAILED for r in results)])
+        console.print_check(checked, screen())
+    if junit is not None:
+        whole_file.write(junit, check_report.junit(checked))
+    if summary is not None:
+        whole_file.append(summary, check_report.markdown(checked))
+    return status
+
+
+def _check_names(plans: list[Plan]) -> None:
+    """Raise if two scenarios have one name, by which a verdict is told."""
+    names = [planned.scenario.name for planned in plans]
+    for name in names:
+        if names.count(name) > 1:
+            raise ConfigError(f"two scenarios are called {name!r}: their verdicts would be one")
+
+
+def _results(plans: list[Plan]) -> list[Result | DivergedError]:
+    """Return what came of every plan; one that breaks down does not hide the others."""
+    from fivebar_sim import rollout
+
+    try:
+        return [*rollout.run_all(plans, nthread=0)]
+    except DivergedError:
+        return [_alone(planned) for planned in plans]
+
+
+def _alone(planned: Plan) -> Result | DivergedError:
+    from fivebar_sim import rollout
+
+    try:
+        return rollout.execute(planned)
+    except DivergedError as error:
+        return error
+
+
+def _judge(planned: Plan, result: Result | DivergedError, old: Baseline | None) -> Checked:
+    """Return a scenario's verdict; that it broke down is said at once."""
+    from fivebar_sim import regression
+
+    if isinstance(result, DivergedError):
+        say(result)
+        name = planned.scenario.name
+        return regression.Checked(name, [], str(result).removeprefix(f"{name}: "), [])
+    return regression.compare(result, old)
+
+
+def _update(
+    checked: Checked, result: Result | DivergedError, old: Baseline | None, place: Path
+) -> Checked:
+    """Record a run that keeps its limits as the new baseline; return the verdict that is left."""
+    from fivebar_sim import baseline, regression
+
+    if isinstance(result, DivergedError) or result.verdict != "pass":
+        return checked._replace(notes=[*checked.notes, "its baseline is not updated: it failed"])
+    accepted, new = regression.accept(checked), baseline.record(result.metrics, old)
+    if new == old:
+        return accepted
+    baseline.write(place, new)
+    return accepted._replace(notes=[f"baseline recorded in {place}"])
+
+
+def _keep(checked: Checked, result: Result | DivergedError, folder: Path) -> int:
+    """Write the run directory of a scenario that failed; return its exit status."""
+    if not checked.failures:
+        return 0
+    if not isinstance(result, DivergedError):
+        place = folder / checked.name
+        try:
+            checked.notes.append(f"its run is kept in {result.write(place)}")
+        except RunDirectoryError as error:
+            say(error)
+            return WRONG
+    return FAILED

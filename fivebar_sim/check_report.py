@@ -1,0 +1,97 @@
+"""What a CI job shows of a check: JUnit XML for its list of tests, Markdown for its page."""
+
+from __future__ import annotations
+
+import html
+import re
+from collections.abc import Iterator, Sequence
+from xml.etree import ElementTree
+
+from fivebar_sim.console import SHOWN, bounds, shown
+from fivebar_sim.regression import BETTER, FAIL, Checked, Row
+
+NO_XML = re.compile("[^\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
+"""Characters that XML 1.0 has no way to write."""
+
+MARKDOWN = re.compile(r"[\\`*_\[\]<>|~&#@$]")
+"""Characters that Markdown, on a CI job's page, may read as more than themselves."""
+
+
+def junit(checked: Sequence[Checked]) -> str:
+    """Return JUnit XML: one suite, a test case for each run and each metric that was judged.
+
+    It says nothing of time, so that equal checks give equal files.
+    """
+    suites = ElementTree.Element("testsuites")
+    suite = ElementTree.SubElement(suites, "testsuite", name="fivebar check")
+    for each in checked:
+        said = [each.broke] if each.broke else []
+        _case(suite, each.name, "run", said, each.remarks)
+        for row in each.rows:
+            whys = [row.why] if row.why else []
+            failed = row.verdict == FAIL
+            _case(suite, each.name, row.key, *((whys, []) if failed else ([], whys)))
+    counts = {
+        "tests": len(suite),
+        "failures": len(suite.findall("testcase/failure")),
+        "errors": 0,
+        "skipped": 0,
+    }
+    for element in (suites, suite):
+        element.attrib.update({key: str(count) for key, count in counts.items()})
+    ElementTree.indent(suites)
+    text = ElementTree.tostring(suites, encoding="unicode")
+    return f'<?xml version="1.0" encoding="UTF-8"?>\n{text}\n'
+
+
+def _case(
+    suite: ElementTree.Element, run: str, name: str, whys: Sequence[str], said: Sequence[str]
+) -> None:
+    """Append a test case: failed if there is a why, with what it says besides."""
+    case = ElementTree.SubElement(suite, "testcase", classname=_xml(run), name=name)
+    for why in whys:
+        ElementTree.SubElement(case, "failure", message=_xml(why), type="check").text = _xml(why)
+    if said:
+        ElementTree.SubElement(case, "system-out").text = _xml("\n".join(said))
+
+
+def _xml(text: str) -> str:
+    return NO_XML.sub("\ufffd", text)
+
+
+def markdown(checked: Sequence[Checked]) -> str:
+    """Return a summary: what failed or should be known, then every metric, folded away."""
+    failed = sum(bool(each.failures) for each in checked)
+    verdict = f"{failed} of {len(checked)} failed" if failed else f"all {len(checked)} pass"
+    lines = [f"## fivebar check: {verdict}", ""]
+    for each in checked:
+        said = [*(("FAIL", line) for line in each.failures), *(("note", r) for r in each.remarks)]
+        lines += [f"- **{word}** {_md(each.name)}: {_md(line)}" for word, line in said]
+    lines += ["", "<details><summary>every metric</summary>", "", *_table(checked), ""]
+    return "\n".join([*lines, "</details>", "", ""])
+
+
+def _table(checked: Sequence[Checked]) -> Iterator[str]:
+    """Yield the lines of the table of all metrics."""
+    yield "| scenario | metric | limit | baseline | now | change | verdict |"
+    yield "| --- | --- | ---: | ---: | ---: | ---: | --- |"
+    for each in checked:
+        if each.broke or not each.rows:
+            verdict = f"**{FAIL}**" if each.broke else "pass"
+            yield f"| {_md(each.name)} | run | | | | | {verdict} |"
+        for row in each.rows:
+            yield f"| {' | '.join([_md(each.name), *_cells(row)])} |"
+
+
+def _cells(row: Row) -> list[str]:
+    """Return what the table says of one metric."""
+    limit = bounds(row.limit) if row.limit else ""
+    then = shown(row.key, row.recorded.value) if row.recorded else ""
+    cells = [SHOWN[row.key][0], limit, then, shown(row.key, row.now), row.change]
+    verdict = f"**{row.verdict}**" if row.verdict in (FAIL, BETTER) else row.verdict
+    return [*map(html.escape, cells), verdict]
+
+
+def _md(text: str) -> str:
+    """Return a text of which Markdown and HTML read every character as itself."""
+    return MARKDOWN.sub(lambda found: f"&#{ord(found[0])};", " ".join(text.split()))

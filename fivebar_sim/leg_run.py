@@ -1,0 +1,185 @@
+"""A scenario run within somebody's test: whose controller drives it, and what may be asserted."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from math import inf
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import tomli_w
+
+from fivebar_sim import console, control, metrics, regression, rollout, tables
+from fivebar_sim.checks import check_number
+from fivebar_sim.control import Feedback, Setpoints
+from fivebar_sim.errors import ArgumentError, ConfigError, FiveBarError, unknown
+from fivebar_sim.metrics import Limit, Record
+from fivebar_sim.rollout import Result
+from fivebar_sim.scenario import Scenario
+
+
+@dataclass(frozen=True, slots=True)
+class LegRun:
+    """What came of a run, and what may be asserted about it.
+
+    Attributes:
+        result: As `fivebar_sim.run` returns it.
+    """
+
+    result: Result
+
+    def __repr__(self) -> str:
+        """Return name and verdict: pytest prints it in full with a failure."""
+        return f"LegRun({self.scenario.name}: {self.verdict})"
+
+    @property
+    def scenario(self) -> Scenario:
+        """What was run."""
+        return self.result.scenario
+
+    @property
+    def record(self) -> Record:
+        """The columns of rollout.parquet, each (N,), SI."""
+        return self.result.record
+
+    @property
+    def metrics(self) -> dict[str, Any]:
+        """What metrics.json says."""
+        return self.result.metrics
+
+    @property
+    def limits(self) -> list[Limit]:
+        """Every limit with its value."""
+        return self.result.limits
+
+    @property
+    def verdict(self) -> str:
+        """Either "pass" or "fail"."""
+        return self.result.verdict
+
+    def assert_limits(self) -> None:
+        """Fail unless the verdict is "pass": all limits hold, and the leg kept its branch.
+
+        Raises:
+            AssertionError: One line for every broken limit, and when the leg left its branch.
+            ConfigError: The scenario has no limits, so that nothing would be asserted.
+        """
+        __tracebackhide__ = True
+        if not self.limits:
+            raise ConfigError(f"{self.scenario.name} has no [limits]: there is nothing to assert")
+        failures = regression.compare(self.result, None).failures
+        if failures:
+            raise AssertionError("\n  ".join([f"{self.scenario.name} fails:", *failures]))
+
+    def assert_metric(
+        self, key: str, *, low: float | None = None, high: float | None = None
+    ) -> None:
+        """Fail unless low <= metric <= high, in SI units.
+
+        Args:
+            key: The metric's dotted key, as in [limits]: "tracking.rms".
+            low: Least value that passes; None is none.
+            high: Greatest value that passes; None is none.
+
+        Raises:
+            AssertionError: Names the metric with its value and bounds.
+            ArgumentError: No such metric in this run, no bound, or low > high.
+        """
+        __tracebackhide__ = True
+        known = [each for each in metrics.LIMIT_KEYS if each.split(".")[0] in self.metrics]
+        if key not in known:
+            raise ArgumentError(unknown("metric", key, known))
+        if low is None and high is None:
+            raise ArgumentError(f"{key} needs a bound: give low, high or both")
+        if low is not None:
+            check_number("low", low, "")
+        if high is not None:
+            check_number("high", high, "", low=-inf if low is None else low)
+        bounds = (-inf if low is None else low, inf if high is None else high)
+        (judged,) = metrics.judge(self.metrics, {key: bounds})
+        if not judged.ok:
+            legal = console.bounds(judged) if high is not None else f">= {console.shown(key, low)}"
+            said = f"{console.SHOWN[key][0]}: {console.shown(key, judged.value)}, limit {legal}"
+            raise AssertionError(f"{self.scenario.name} fails:\n  {said}")
+
+
+@dataclass(frozen=True, slots=True)
+class LegRunner:
+    """Runs scenarios for one test: what the fixture `leg_run` is.
+
+    Attributes:
+        folder: Of the test file: scenarios are looked up beside it.
+        runs: What was run, for whoever keeps it.
+    """
+
+    folder: Path
+    runs: list[Result] = field(repr=False)
+
+    def __call__(
+        self,
+        scenario: str | Path,
+        *,
+        controller: Setpoints | Feedback | None = None,
+        settings: Sequence[str] = (),
+    ) -> LegRun:
+        """Return what came of a scenario.
+
+        Args:
+            scenario: A TOML file, relative to the test file's folder; or the name of one that
+                ships with fivebar-sim.
+            controller: Drives the motors instead of the scenario's [controller].
+            settings: Changes "KEY=VALUE" with dotted keys, as those of `fivebar run --set`.
+
+        Raises:
+            ConfigError: The scenario, a setting or the controller is none.
+            UnreachableError: The path leaves what the leg can reach.
+            DivergedError: The simulation broke down; says when.
+        """
+        __tracebackhide__ = True
+        try:
+            result = rollout.run(self._load(str(scenario), controller, settings))
+        except FiveBarError as error:
+            raise error.with_traceback(None) from None  # the test's line, and what is wrong
+        self.runs.append(result)
+        return LegRun(result)
+
+    def _load(
+        self, source: str, controller: Setpoints | Feedback | None, settings: Sequence[str]
+    ) -> Scenario:
+        if isinstance(settings, str):
+            raise ConfigError(f'settings must be a list of "KEY=VALUE", got {settings!r}')
+        place = self.folder / source if source.endswith(".toml") else source
+        if controller is None:
+            return Scenario.load(place, settings)
+        for setting in settings:
+            if tables.parse_setting(setting)[0][0] == "controller":
+                raise ConfigError(f"settings change the controller, and one is given: {setting!r}")
+        return driven(Scenario.load(place, [*settings, "controller={}"]), controller)
+
+
+def driven(scenario: Scenario, controller: Setpoints | Feedback) -> Scenario:
+    """Return a scenario that another controller drives.
+
+    In its table the controller has the name of its entry point, or of its class if it has none.
+
+    Raises:
+        ConfigError: The object is no controller, or has a field that no TOML could hold.
+    """
+    ours = isinstance(controller, (Setpoints, Feedback))
+    if not ours or not isinstance(controller, msgspec.Struct):
+        raise ConfigError(
+            "controller must be a msgspec Struct with setpoints(), or with command(), drive and "
+            f"period, got {controller!r}"
+        )
+    kind = type(controller)
+    value = f"{kind.__module__}:{kind.__qualname__}"
+    named = (name for name, entry in control.known().items() if entry.value == value)
+    name = next(named, kind.__name__)
+    scenario = msgspec.structs.replace(scenario, controller=controller, controller_name=name)
+    try:
+        tomli_w.dumps(scenario.table())
+    except TypeError as error:
+        raise ConfigError(f"controller {name!r} has a field that is no TOML: {error}") from None
+    return scenario

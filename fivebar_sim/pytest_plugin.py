@@ -1,0 +1,122 @@
+"""The pytest plugin: the fixture `leg_run`, and what is kept of the runs of a test that fails.
+
+Nothing heavy is imported before a test asks for the fixture: pytest loads this file every time.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import re
+import shutil
+from collections.abc import Generator
+from itertools import count
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import pytest
+
+if TYPE_CHECKING:
+    from fivebar_sim.leg_run import LegRunner
+    from fivebar_sim.rollout import Result
+
+RUNS: pytest.StashKey[list[Result]] = pytest.StashKey()
+"""The runs of a test, until it is over."""
+
+PLAIN = re.compile(r"(?:\w+/)*\w+\.py(?:::\w+)+")
+"""A test's id whose folder tells it from all others as it stands."""
+
+LONGEST = 120
+"""Letters of a test's folder, before what tells it from others."""
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """Add --fivebar-artifacts."""
+    parser.getgroup("fivebar", "foot tracking").addoption(
+        "--fivebar-artifacts",
+        metavar="DIR",
+        default="fivebar-artifacts",
+        help="where the runs of a failed test are kept, relative to rootdir (%(default)s)",
+    )
+
+
+@pytest.fixture
+def leg_run(request: pytest.FixtureRequest) -> LegRunner:
+    """Run scenarios: `leg_run("trot.toml", controller=Mine()).assert_limits()`.
+
+    What a failed test ran is kept under --fivebar-artifacts, with pictures of its foot tracking.
+    """
+    from fivebar_sim.leg_run import LegRunner
+
+    _clear(_folder(request.node))
+    return LegRunner(request.path.parent, request.node.stash.setdefault(RUNS, []))
+
+
+@pytest.hookimpl(wrapper=True, tryfirst=True)
+def pytest_runtest_makereport(
+    item: pytest.Item, call: pytest.CallInfo[None]
+) -> Generator[None, pytest.TestReport, pytest.TestReport]:
+    """Keep the runs of a test that failed, and say where; forget those of one that is over."""
+    report = yield
+    runs = item.stash.get(RUNS, [])
+    if report.failed and runs:
+        lines = [_keep(result, _folder(item), item.config) for result in runs]
+        report.sections.append(("runs of the leg", "\n".join(lines)))
+    if report.failed or call.when == "teardown":
+        runs.clear()
+    return report
+
+
+def _folder(item: pytest.Item) -> Path:
+    """Return where the runs of a test are kept if it fails."""
+    artifacts = str(item.config.getoption("fivebar_artifacts"))
+    return item.config.rootpath / artifacts / name_of(item.nodeid)
+
+
+def name_of(nodeid: str) -> str:
+    """Return what the folder of a test is called: a plain file name, no two tests have one."""
+    name = re.sub(r"[^\w.]+", "-", nodeid)
+    if PLAIN.fullmatch(nodeid) and len(name) <= LONGEST:
+        return name
+    own = hashlib.sha256(nodeid.encode("utf-8", "backslashreplace")).hexdigest()[:10]
+    return f"{name[:LONGEST].strip('-.')}-{own}"
+
+
+def _clear(folder: Path) -> None:
+    """Delete the runs that an earlier failure of a test left; anything else stays."""
+    if not folder.is_dir():
+        return
+    from fivebar_sim import run_directory
+
+    for place in folder.iterdir():
+        if run_directory.is_run(place) and not place.is_symlink():
+            shutil.rmtree(place)
+    if not any(folder.iterdir()):
+        folder.rmdir()
+
+
+def _keep(result: Result, folder: Path, config: pytest.Config) -> str:
+    """Write a run directory with its pictures; return the line that says where it is."""
+    name = result.scenario.name
+    places = (folder / (f"{name}-{number}" if number > 1 else name) for number in count(1))
+    place = next(place for place in places if not place.exists())
+    here = config.invocation_params.dir
+    shown = place.relative_to(here) if place.is_relative_to(here) else place
+    try:
+        result.write(place)
+        files = ["recording.rrd", *_draw(result, place)]
+    except Exception as error:  # what a hook raises would end the whole session
+        return f"{name}: {result.verdict}, but cannot all be kept in {shown}: {error}"
+    return f"{name}: {result.verdict}, kept in {shown} ({', '.join(files)})"
+
+
+def _draw(result: Result, place: Path) -> list[str]:
+    """Write the pictures of the foot's path and of its error; return their names."""
+    from fivebar_sim.report import in_plane, look, over_time
+    from fivebar_sim.stored_run import StoredRun
+
+    run, names = StoredRun(place, result.scenario, result.record, result.metrics), []
+    with look.styled():
+        for drawn in (in_plane.foot_path(run), over_time.tracking_error(run)):
+            names.append(f"{drawn.key}.png")
+            (place / names[-1]).write_bytes(look.png(drawn.figure))
+    return names

@@ -1,0 +1,146 @@
+"""A run against its limits and its baseline, metric by metric."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from fivebar_sim.baseline import LESS_IS_BETTER, Baseline, Recorded
+from fivebar_sim.console import SHOWN, bounds, shown
+from fivebar_sim.metrics import Limit, look_up
+
+if TYPE_CHECKING:
+    from fivebar_sim.rollout import Result
+
+PASS, FAIL, BETTER, NEW = "pass", "FAIL", "better", "new"
+
+
+class Row(NamedTuple):
+    """One metric.
+
+    Attributes:
+        key: Its dotted key.
+        limit: Its limit, if the scenario sets one.
+        recorded: What the baseline has, if it does.
+        now: What was measured; None where it is undefined.
+        verdict: `PASS`, `FAIL`, `BETTER` or `NEW`; the last was moved on purpose, see `accept`.
+        why: What is wrong, or moved; "" where it passes.
+    """
+
+    key: str
+    limit: Limit | None
+    recorded: Recorded | None
+    now: float | None
+    verdict: str
+    why: str
+
+    @property
+    def change(self) -> str:
+        """The change since the baseline, in percent of it; "" where there is nothing to say."""
+        if self.recorded is None or self.recorded.value is None or self.now is None:
+            return ""
+        return _change(self.recorded.value, self.now, self.key)
+
+
+class Checked(NamedTuple):
+    """What came of one scenario.
+
+    Attributes:
+        name: The scenario's.
+        rows: Its metrics that have a limit or a baseline.
+        broke: Why the run itself failed: it diverged, or left its branch; "" if it did not.
+        notes: What should be known besides: no baseline, or one that was made otherwise.
+    """
+
+    name: str
+    rows: list[Row]
+    broke: str
+    notes: list[str]
+
+    @property
+    def failures(self) -> list[str]:
+        """What is wrong, one line each."""
+        whys = [row.why for row in self.rows if row.verdict == FAIL]
+        return [self.broke, *whys] if self.broke else whys
+
+    @property
+    def remarks(self) -> list[str]:
+        """What is no failure, but should be known: the notes, and how much got better."""
+        better = [SHOWN[row.key][0] for row in self.rows if row.verdict == BETTER]
+        told = f"better than its baseline: {', '.join(better)}; --update records it"
+        return [told, *self.notes] if better else self.notes
+
+
+def compare(result: Result, baseline: Baseline | None) -> Checked:
+    """Return a run against its limits and its baseline."""
+    metrics, limits = result.metrics, {limit.key: limit for limit in result.limits}
+    recorded = baseline.metrics if baseline else {}
+    rows = [
+        _row(key, limits.get(key), recorded.get(key), metrics)
+        for key in SHOWN
+        if key in limits or key in recorded
+    ]
+    notes = list(_notes(baseline, metrics))
+    return Checked(result.scenario.name, rows, _broke(result), notes)
+
+
+def accept(checked: Checked) -> Checked:
+    """Return what was checked with every difference to the baseline accepted."""
+    rows = [row if row.verdict == PASS else row._replace(verdict=NEW) for row in checked.rows]
+    return checked._replace(rows=rows, notes=[])
+
+
+def _broke(result: Result) -> str:
+    """Return why a run failed, if not by its limits."""
+    flip = result.metrics["branch"]["first_flip"]
+    if flip is not None:
+        return f"the leg left its branch at t = {flip:g} s"
+    unexplained = result.verdict != "pass" and all(limit.ok for limit in result.limits)
+    return "the run's own verdict is fail" if unexplained else ""
+
+
+def _notes(baseline: Baseline | None, metrics: Mapping[str, Any]) -> Iterator[str]:
+    """Yield what should be known of a baseline."""
+    if baseline is None:
+        yield "no baseline: judged by its limits alone; --update records one"
+        return
+    differences = baseline.differences(metrics["provenance"])
+    if differences:
+        yield f"its baseline was made with {'; '.join(differences)}"
+
+
+def _row(
+    key: str, limit: Limit | None, recorded: Recorded | None, metrics: Mapping[str, Any]
+) -> Row:
+    """Return one metric, judged by its limit first."""
+    now = look_up(metrics, key) if key.split(".")[0] in metrics else None
+    label, verdict, why = SHOWN[key][0], PASS, ""
+    if recorded is not None:
+        verdict, why = _against(key, recorded, now)
+    if limit is not None and not limit.ok:
+        verdict, why = FAIL, f"{shown(key, now)}, limit {bounds(limit)}"
+    return Row(key, limit, recorded, now, verdict, why and f"{label}: {why}")
+
+
+def _against(key: str, recorded: Recorded, now: float | None) -> tuple[str, str]:
+    """Return the verdict of a metric against its recorded value, and why."""
+    then = recorded.value
+    if then is None or now is None:
+        same = then is now
+        return (PASS, "") if same else (FAIL, f"{shown(key, now)}, baseline {shown(key, then)}")
+    if abs(now - then) <= recorded.tolerance:
+        return PASS, ""
+    less = key.startswith(LESS_IS_BETTER) and now < then
+    tolerance = f"{shown(key, recorded.tolerance)} allowed"
+    moved = f"{shown(key, now)}, baseline {shown(key, then)} ({_change(then, now, key)}; "
+    return (BETTER if less else FAIL), f"{moved}{tolerance})"
+
+
+def _change(then: float, now: float, key: str) -> str:
+    """Return a change in percent, or in the metric's unit where it was zero."""
+    if now == then:
+        return "0.0 %"
+    if then == 0.0:
+        return f"{'+' if now > 0.0 else ''}{shown(key, now)}"
+    percent = f"{100.0 * (now - then) / abs(then):+.1f} %"
+    return "0.0 %" if percent in ("+0.0 %", "-0.0 %") else percent

@@ -1,0 +1,277 @@
+"""The pytest plugin: a user's tests, run by a pytest of their own."""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+import tomllib
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from shell import ELLIPSE
+
+from fivebar_sim import pytest_plugin, stored_run
+
+ROOT = Path(__file__).resolve().parents[1]
+LIMITS = '[limits]\ntracking.rms = 1e-6\n"load.share_A" = [0.4, 0.6]\nclosure.max = 1e-9\n'
+FAST = ELLIPSE.replace("duration = 0.6", "duration = 0.4")
+LAW = """
+import msgspec
+
+class Ahead(msgspec.Struct, frozen=True):
+    lead: float = 0.0
+    def setpoints(self, leg, servo, motion, integrator):
+        return (motion.q + self.lead * motion.q_dot)[1:, [0, 2]]
+"""
+KEPT = {
+    *("scenario.toml", "metrics.json", "rollout.parquet", "recording.rrd"),
+    *("foot-path.png", "tracking-error.png"),
+}
+
+Session = Callable[..., str]
+
+
+@pytest.fixture
+def session(tmp_path: Path) -> Session:
+    """Return a function that runs tests in a repository and returns what pytest said."""
+    (tmp_path / "pyproject.toml").write_text("[tool.pytest.ini_options]\n", encoding="utf-8")
+    tests = tmp_path / "tests"
+    tests.mkdir()
+    (tests / "mine.toml").write_text(FAST, encoding="utf-8")
+    (tests / "strict.toml").write_text(FAST + LIMITS, encoding="utf-8")
+
+    def run(source: str, *options: str, failed: int = 0, passed: int = 0, errors: int = 0) -> str:
+        (tests / "test_mine.py").write_text(LAW + source, encoding="utf-8")
+        ended = subprocess.run(
+            [sys.executable, "-m", "pytest", "-p", pytest_plugin.__name__, "-W", "error", *options],
+            cwd=tmp_path,
+            env={**os.environ, "PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1"},
+            capture_output=True,
+            text=True,
+        )
+        assert "INTERNALERROR" not in ended.stdout + ended.stderr
+        for count, what in ((failed, "failed"), (passed, "passed"), (errors, "error")):
+            found = re.search(rf"(\d+) {what}", ended.stdout)
+            assert int(found[1] if found else 0) == count, ended.stdout + ended.stderr
+        assert ended.returncode == bool(failed or errors)
+        return ended.stdout
+
+    return run
+
+
+def errors(said: str) -> list[str]:
+    """Return the lines that say what is wrong."""
+    return [line[1:].strip() for line in said.splitlines() if re.match(r"E\s", line)]
+
+
+def test_entry_point_is_the_plugin() -> None:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    assert project["entry-points"]["pytest11"] == {"fivebar": pytest_plugin.__name__}
+
+
+def test_passing_tests_leave_nothing(session: Session, tmp_path: Path) -> None:
+    said = session(
+        """
+import sys
+import pytest
+
+def test_nothing_is_imported_before_it_is_used():
+    loaded = {name for name in sys.modules if name.startswith("fivebar_sim")}
+    assert loaded == {"fivebar_sim", "fivebar_sim.pytest_plugin"}
+    heavy = {"numpy", "mujoco", "rerun", "matplotlib", "scipy", "pyarrow", "rich"}
+    assert not heavy & set(sys.modules)
+
+def test_shipped_and_own(leg_run):
+    leg_run("classic-figure-eight").assert_limits()
+    slow = leg_run("mine.toml", controller=Ahead())
+    fast = leg_run("mine.toml", controller=Ahead(lead=0.05 / 8), settings=["duration=0.5"])
+    assert fast.metrics["tracking"]["rms"] < 0.1 * slow.metrics["tracking"]["rms"]
+    assert len(fast.record["time"]) == 500
+    assert fast.verdict == "pass" and fast.limits == []
+    assert fast.scenario.controller == Ahead(lead=0.05 / 8)
+    fast.assert_metric("tracking.rms", low=0.0, high=1e-3)
+    with pytest.raises(AssertionError):
+        slow.assert_metric("tracking.rms", high=1e-3)
+
+@pytest.mark.xfail(strict=True)
+def test_known_to_fail(leg_run):
+    leg_run("strict.toml").assert_limits()
+
+def test_installed_controller_keeps_its_name(leg_run):
+    from controllers.servo import Servo
+
+    assert leg_run("mine.toml", controller=Servo()).scenario.controller_name == "servo"
+
+def test_runs_are_forgotten(request):
+    from fivebar_sim.pytest_plugin import RUNS
+
+    kept = [item.stash[RUNS] for item in request.session.items if RUNS in item.stash]
+    assert kept == [[], [], []]
+""",
+        passed=4,
+    )
+    assert "1 xfailed" in said
+    assert not (tmp_path / "fivebar-artifacts").exists()
+
+
+def test_failed_test_says_what_broke_and_keeps_its_runs(session: Session, tmp_path: Path) -> None:
+    source = """
+import pytest
+
+@pytest.mark.parametrize("L2", [0.06, 0.062])
+def test_strict(leg_run, L2):
+    leg_run("strict.toml", settings=[f"leg.L2={L2}"]).assert_limits()
+
+def test_flip(leg_run):
+    leg_run("mine.toml", settings=["controller.name=pd", "controller.kp=0", "controller.kd=0",
+        "limits={warnings=0}", "duration=1.0"]).assert_limits()
+
+def test_range(leg_run):
+    leg_run("mine.toml")
+    leg_run("mine.toml").assert_metric("load.share_A", low=0.9)
+"""
+    said = session(source, failed=4)
+    assert re.search(
+        r"AssertionError: short fails:\nE +tracking RMS: [\d.]+ mm, limit <= 1 um\n", said
+    )
+    assert re.search(r"E +loop gap max: [\d.]+ um, limit <= 1 nm\n", said)
+    assert re.search(r"E +load share A: [\d.]+ %, limit >= 90 %\n", said)
+    assert re.search(r"E +the leg left its branch at t = [\d.]+ s\n", said)
+    assert "leg_run.py" not in said  # the traceback is the test's alone
+    assert len(re.findall("load share A", said)) == 1  # it holds in the other two
+    folder = tmp_path / "fivebar-artifacts"
+    tests = {place.name.removeprefix("tests-test_mine.py-") for place in folder.iterdir()}
+    assert {re.sub(r"-\w{10}$", "", name) for name in tests} == {
+        *("test_strict-0.06", "test_strict-0.062", "test_flip", "test_range")
+    }
+    places = [place for test in folder.iterdir() for place in test.iterdir()]
+    assert sorted(place.name for place in places) == ["short"] * 4 + ["short-2"]
+    for place in places:
+        assert {file.name for file in place.iterdir()} == KEPT
+        assert f"kept in {place.relative_to(tmp_path)} (recording.rrd" in said
+        assert (place / "tracking-error.png").read_bytes().startswith(b"\x89PNG")
+        stored_run.read(place)
+
+    (folder / "mine.txt").touch()
+    session(source.replace("low=0.9", "low=0.1"), "-k", "range", passed=1)
+    assert not (folder / "tests-test_mine.py-test_range").exists()
+    assert len(list(folder.iterdir())) == 4
+
+
+def test_runs_of_a_test_and_its_fixture_are_kept_once(session: Session, tmp_path: Path) -> None:
+    said = session(
+        """
+import pytest
+
+@pytest.fixture
+def result(leg_run):
+    yield leg_run("mine.toml", controller=Ahead())
+    assert False
+
+def test_good(result):
+    assert result.verdict == "pass"
+
+def test_bad(result):
+    assert result.verdict == "fail"
+""",
+        *("--fivebar-artifacts", "out/legs"),
+        passed=1,
+        failed=1,
+        errors=2,
+    )
+    places = sorted((tmp_path / "out/legs").glob("*/*"))
+    assert [f"{place.parent.name}/{place.name}" for place in places] == [
+        *("tests-test_mine.py-test_bad/short", "tests-test_mine.py-test_good/short")
+    ]
+    place = places[0]
+    assert {file.name for file in place.iterdir()} == KEPT
+    assert 'name = "Ahead"' in (place / "scenario.toml").read_text(encoding="utf-8")
+    assert "AssertionError: assert 'pass' == 'fail'" in said
+    for place in places:
+        assert said.count(f"kept in {place.relative_to(tmp_path)}") == 1
+
+
+def test_place_that_cannot_be_written_does_not_end_the_session(
+    session: Session, tmp_path: Path
+) -> None:
+    (tmp_path / "taken").touch()
+    said = session(
+        'def test_it(leg_run):\n    leg_run("strict.toml").assert_limits()\n',
+        *("--fivebar-artifacts", "taken"),
+        failed=1,
+    )
+    assert "short: fail, but cannot all be kept in taken/tests-test_mine.py-test_it/short" in said
+
+
+REFUSED = {
+    '"classic-elipse"': "unknown scenario 'classic-elipse'; known: .*did you mean",
+    '"none.toml"': r"cannot read .*/tests/none\.toml",
+    '"mine.toml", settings=["leg.L9=1"]': "L9",
+    '"mine.toml", settings="leg.L2=1"': "settings must be a list of",
+    '"mine.toml", controller=7': "controller must be a msgspec Struct .*, got 7",
+    '"mine.toml", controller=Ahead': "controller must be a msgspec Struct .*got <class",
+    '"mine.toml", controller=Ahead(lead={1j})': "controller 'Ahead' has a field that is no TOML",
+    '"mine.toml", controller=Ahead(), settings=["controller.lead=1"]': "settings change the contr",
+    '"mine.toml", settings=["path.centre=[0.0, -0.2]"]': "reach",
+    '"mine.toml", settings=["controller.name=pd", "controller.kd=9"]': "at t = ",
+}
+
+
+def test_refusals_are_one_line(session: Session, tmp_path: Path) -> None:
+    said = session(
+        "\n".join(
+            f"def test_{k}(leg_run):\n    leg_run({call})\n" for k, call in enumerate(REFUSED)
+        ),
+        failed=len(REFUSED),
+    )
+    for line, wanted in zip(errors(said), REFUSED.values(), strict=True):
+        assert re.match(rf"fivebar_sim\.errors\.\w+: .*{wanted}", line), line
+    assert "leg_run.py" not in said
+    assert not (tmp_path / "fivebar-artifacts").exists()
+
+
+def test_what_cannot_be_asserted(session: Session) -> None:
+    session(
+        """
+import re
+import pytest
+
+def test_it(leg_run):
+    run = leg_run("mine.toml")
+    with pytest.raises(ValueError, match=re.escape("short has no [limits]: there is nothing")):
+        run.assert_limits()
+    for key, bounds, wanted in [
+        ("tracking.rsm", {"high": 1}, "unknown metric 'tracking.rsm'; known: "),
+        ("ground.slip", {"high": 1}, "unknown metric 'ground.slip'; known: "),
+        ("tracking.rms", {}, "tracking.rms needs a bound"),
+        ("tracking.rms", {"low": 1, "high": 0.5}, "high must be in [1, inf), got 0.5"),
+        ("tracking.rms", {"low": float("nan")}, "low must be in (-inf, inf), got nan"),
+    ]:
+        with pytest.raises(ValueError, match=re.escape(wanted)):
+            run.assert_metric(key, **bounds)
+""",
+        passed=1,
+    )
+
+
+PART = st.text(st.sampled_from("ab-_./:[] 1"), min_size=1, max_size=6)
+
+
+@given(PART, PART)
+def test_no_two_tests_share_a_folder(one: str, other: str) -> None:
+    names = [pytest_plugin.name_of(f"tests/test_it.py::test_{each}") for each in (one, other)]
+    assert (names[0] == names[1]) == (one == other)
+    for name in names:
+        assert re.fullmatch(r"[\w.-]{1,131}", name)
+        assert Path(name).name == name
+
+
+def test_long_names_are_cut() -> None:
+    names = {pytest_plugin.name_of(f"test_it.py::test_{'x' * 300}{end}") for end in "ab"}
+    assert len(names) == 2
+    assert max(map(len, names)) <= 131
