@@ -121,12 +121,12 @@ def test_resolved_table_gives_the_same_run(tmp_path: Path, name: str) -> None:
     folder = tmp_path / "run"
     folder.mkdir()
     (folder / "scenario.toml").write_text(tomli_w.dumps(first.table()), encoding="utf-8")
-    if isinstance(first.path, Csv):
-        shutil.copyfile(first.path.file, folder / copied_name(first.path))
+    for name, source in first.files.items():
+        shutil.copyfile(source, folder / name)
     again = Scenario.load(folder / "scenario.toml")
     assert again.table() == first.table()
     if isinstance(first.path, Csv) and isinstance(again.path, Csv):
-        assert Path(again.path.file) == folder / copied_name(first.path)
+        assert Path(again.path.file) == folder / str(copied_name(first.path))
         again = msgspec.structs.replace(again, path=first.path)
     assert again == first
     one, two = rollout.run(first), rollout.run(Scenario.load(folder / "scenario.toml"))

@@ -128,8 +128,8 @@ def test_file_of_a_ground_stands_in_its_keyframe(kind: str) -> None:
     mj.geom_surfacevel[:] = 0.0
     for _ in range(1000):
         mujoco.mj_step(mj, data)
-    # the contact is soft: the ball sinks in by 0.63 mm under 5 N
-    assert data.site("foot").xpos[2] == pytest.approx(CLASSIC.foot_radius, abs=0.9e-3)  # it sinks in
+    # the contact is soft: the ball sinks in by 0.82 mm under 5 N
+    assert data.site("foot").xpos[2] == pytest.approx(CLASSIC.foot_radius, abs=0.9e-3)
     # and the servos give way by tau / kp, some 0.14 N m of 8 N m/rad
     assert abs(data.joint("hip_z").qpos[0] - 0.0775) < 3e-3
     assert np.abs(data.qvel).max() < 1e-3
