@@ -12,12 +12,9 @@ from typing import Any
 
 import mujoco
 import numpy as np
-from dm_control.mujoco import Physics
-from dm_control.mujoco.wrapper import MjModel
-from dm_control.rl import control
 from dm_env import specs
 
-from fivebar_sim import tasks
+from fivebar_sim import gl, tasks
 from fivebar_sim.arrays import Array
 from fivebar_sim.checks import is_finite
 from fivebar_sim.episodes import Episodes, Outcome
@@ -26,6 +23,12 @@ from fivebar_sim.geometry import FiveBar
 from fivebar_sim.leg_group import prepared
 from fivebar_sim.model import quiet
 from fivebar_sim.tasks import REASONS, Randomise, Task
+
+gl.settle()  # before dm_control loads OpenGL
+
+from dm_control.mujoco import Physics  # noqa: E402
+from dm_control.mujoco.wrapper import MjModel  # noqa: E402
+from dm_control.rl import control  # noqa: E402
 
 
 class LegPhysics(Physics):

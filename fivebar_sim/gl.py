@@ -76,6 +76,29 @@ def context(way: str, width: int, height: int) -> Any:
         way: What `find` returned.
         width: [pixels].
         height: [pixels].
+
+    Raises:
+        ConfigError: OpenGL was loaded for something else before, as dm_control does it.
     """
     module = "mujoco.gl_context" if way == "native" else f"mujoco.{way}"
-    return importlib.import_module(module).GLContext(width, height)
+    try:
+        return importlib.import_module(module).GLContext(width, height)
+    except ImportError as error:
+        raise ConfigError(
+            f"cannot draw: OpenGL is loaded for something else than {way} in this process; set "
+            f"MUJOCO_GL={way} before anything is imported"
+        ) from error
+
+
+def settle() -> None:
+    """Let what is imported later draw as we do where there is no screen: set MUJOCO_GL.
+
+    dm_control would otherwise load OpenGL for a screen, and no process can load it twice.
+    """
+    screen = any(os.environ.get(name) for name in ("DISPLAY", "WAYLAND_DISPLAY"))
+    if sys.platform != "linux" or screen or os.environ.get("MUJOCO_GL"):
+        return
+    try:
+        os.environ["MUJOCO_GL"] = find()
+    except ConfigError:
+        os.environ["MUJOCO_GL"] = "disable"

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
 import warnings
 from collections.abc import Generator
 from typing import Any
@@ -11,18 +14,19 @@ import pytest
 from dm_env import StepType, test_utils
 from env_runs import actions, played, scenario, task_of
 
-from fivebar_sim import kinematics
+from fivebar_sim import (
+    environment,  # before dm_control: it settles which OpenGL that loads
+    gl,
+    kinematics,
+)
 from fivebar_sim.errors import ArgumentError, ConfigError, UnreachableError
 from fivebar_sim.gym import LegEnv
 from fivebar_sim.servo import Servo
 from fivebar_sim.tasks import KINDS, Randomise
 
-with warnings.catch_warnings():  # glfw's, where there is no screen
-    warnings.simplefilter("ignore")
-    from absl.testing import absltest
-    from dm_control.rl import control
-
-    from fivebar_sim import environment
+# isort: split
+from absl.testing import absltest
+from dm_control.rl import control
 
 
 class Conformance(test_utils.EnvironmentTestMixin):
@@ -219,3 +223,22 @@ def test_refusal_of_what_is_unknown() -> None:
         environment.load("track", leg="clasic")
     with pytest.raises(UnreachableError, match=r"^the leg drawn from seed 3: path out of reach"):
         environment.load("track", randomise=Randomise(length=(0.3, 0.35)), model_seed=3)
+
+
+def test_dm_control_and_pictures_share_a_process(monkeypatch: pytest.MonkeyPatch) -> None:
+    """dm_control loads OpenGL, once and for all: it must be the one that pictures need."""
+    for name in ("DISPLAY", "WAYLAND_DISPLAY", "MUJOCO_GL"):
+        monkeypatch.delenv(name, raising=False)
+    try:
+        gl.find()
+    except ConfigError as error:
+        if os.environ.get("FIVEBAR_GL") == "required":
+            raise
+        pytest.skip(str(error))
+    code = (
+        "from fivebar_sim import environment, gym; environment.load('track', seed=0); "
+        "env = gym.LegEnv('track', render_mode='rgb_array'); env.reset(seed=0); "
+        "print(env.render().shape)"
+    )
+    done = subprocess.run([sys.executable, "-W", "error", "-c", code], capture_output=True)
+    assert (done.returncode, done.stdout, done.stderr) == (0, b"(480, 640, 3)\n", b"")
