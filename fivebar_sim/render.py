@@ -13,7 +13,7 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
-from fivebar_sim import gl, render_files, render_scene
+from fivebar_sim import gl, render_files, render_scene, whole_file
 from fivebar_sim.checks import check_number
 from fivebar_sim.errors import ConfigError
 from fivebar_sim.render_files import Frame
@@ -113,7 +113,7 @@ def write(replay: Replay, out: Path, film: Film) -> int:
     times = moments(part, film)
     if kind == ".png":
         times = [0.5 * replay.duration if film.at is None else film.at]
-    with render_files.beside(out) as place, stage(replay, film.width, film.height) as drawn:
+    with whole_file.beside(out) as place, stage(replay, film.width, film.height) as drawn:
         frames = (drawn.frame(time) for time in times)
         if kind == ".png":
             render_files.write_png(place, next(frames))

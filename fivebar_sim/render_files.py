@@ -5,11 +5,10 @@ Frames are arrays (height, width, 3) of bytes; only the changed parts of a GIF's
 
 from __future__ import annotations
 
-import os
 import subprocess
 import tempfile
 from collections.abc import Iterable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from itertools import chain, pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -26,28 +25,6 @@ Frame = NDArray[np.uint8]
 
 COLOURS = 255
 """Of a GIF's palette; the 256th stands for a pixel that did not change."""
-
-
-@contextmanager
-def beside(out: Path) -> Iterator[Path]:
-    """Give a place beside a file to write to; it is renamed to the file if all goes well.
-
-    Raises:
-        ConfigError: The file cannot be written.
-    """
-    if out.is_dir():
-        raise ConfigError(f"cannot write {out}: a directory is there")
-    try:
-        handle, name = tempfile.mkstemp(prefix=f".{out.stem}.", suffix=out.suffix, dir=out.parent)
-        os.close(handle)
-        try:
-            yield Path(name)
-            Path(name).chmod(0o644)
-            Path(name).replace(out)
-        finally:
-            Path(name).unlink(missing_ok=True)
-    except OSError as error:
-        raise ConfigError(f"cannot write {out}: {error.strerror or error}") from None
 
 
 def write_png(place: Path, frame: Frame) -> None:

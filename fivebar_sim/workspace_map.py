@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import os
-import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fivebar_sim import kinematics, workspace
+from fivebar_sim import kinematics, whole_file, workspace
 from fivebar_sim.arrays import Array
 from fivebar_sim.errors import ConfigError
 from fivebar_sim.geometry import FiveBar
@@ -88,17 +86,8 @@ def write(leg: FiveBar, out: Path, path: Array | None = None) -> Map:
     surveyed = survey(leg)
     figure = Figure(figsize=(7.0, 6.4), layout="constrained")
     _draw(figure.add_subplot(), leg, surveyed, path)
-    try:
-        handle, name = tempfile.mkstemp(prefix=f".{out.stem}.", suffix=out.suffix, dir=out.parent)
-        os.close(handle)
-        try:
-            figure.savefig(name, dpi=150)
-            Path(name).chmod(0o644)
-            Path(name).replace(out)
-        finally:
-            Path(name).unlink(missing_ok=True)
-    except OSError as error:
-        raise ConfigError(f"cannot write {out}: {error.strerror or error}") from None
+    with whole_file.beside(out) as stage:
+        figure.savefig(stage, dpi=150)
     return surveyed
 
 

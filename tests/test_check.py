@@ -239,7 +239,7 @@ def test_wrong_use_is_one_line(recorded: Shell) -> None:
 @pytest.mark.parametrize(
     ("option", "place", "message"),
     [
-        ("--junit", ".", "cannot write .: something that is no file is there"),
+        ("--junit", ".", "cannot write .: a directory is there"),
         ("--junit", "foot.csv/x.xml", "cannot write foot.csv/x.xml: "),
         ("--junit", "x" * 300, f"cannot write {'x' * 300}: File name too long"),
         ("--summary", ".", "cannot write .: Is a directory"),

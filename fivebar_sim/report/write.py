@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import os
-import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 
-from fivebar_sim import stored_run
+from fivebar_sim import stored_run, whole_file
 from fivebar_sim.errors import ArgumentError, RunDirectoryError
 from fivebar_sim.report import comparison, look, numbers, single
 
@@ -50,7 +49,7 @@ def write(runs: Sequence[Path], out: Path | None = None, png: Path | None = None
             files |= {png / f"{one.key}.png": look.png(one.figure) for one in drawn}
         files[place] = page.encode("utf-8", "backslashreplace")
     for path, content in files.items():
-        _put(path, content)
+        whole_file.write(path, content)
     return list(files)
 
 
@@ -64,20 +63,3 @@ def _check_runs(runs: Sequence[Path]) -> None:
         if place in seen:
             raise ArgumentError(f"the run {run} is given twice")
         seen.add(place)
-
-
-def _put(path: Path, content: bytes) -> None:
-    """Write a file beside its place, then rename it; its folder is made."""
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        handle, name = tempfile.mkstemp(prefix=f".{path.stem}.", suffix=".partial", dir=path.parent)
-        stage = Path(name)
-        try:
-            with os.fdopen(handle, "wb") as file:
-                file.write(content)
-            stage.chmod(0o644)
-            stage.replace(path)
-        finally:
-            stage.unlink(missing_ok=True)
-    except OSError as error:
-        raise RunDirectoryError(f"cannot write {path}: {error.strerror or error}") from None
