@@ -1,0 +1,46 @@
+"""The search and the measure of scripts/train_hop.py."""
+
+from __future__ import annotations
+
+import runpy
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from fivebar_sim import rollout
+
+SCRIPT = Path(__file__).parents[1] / "scripts" / "train_hop.py"
+
+
+@pytest.fixture(scope="module")
+def script() -> dict[str, Any]:
+    return runpy.run_path(str(SCRIPT))
+
+
+def test_search_finds_the_top_of_a_long_ridge(script: dict[str, Any]) -> None:
+    """An ellipsoid of axes 1 to 1000, which needs C: steps of one length take 10^4 generations."""
+    scale, top = np.logspace(0.0, 3.0, 6), np.arange(6.0)
+    search = script["Cma"](6, 12, 0.5, np.random.default_rng(0))
+    for _ in range(400):
+        x = search.ask()
+        assert x.shape == (12, 6)
+        search.tell(-((scale * (x - top)) ** 2).sum(axis=1))
+    np.testing.assert_allclose(search.mean, top, rtol=0.0, atol=1e-6)
+    assert search.sigma < 1e-3
+
+
+def test_a_few_generations_hop_higher_and_again_alike(script: dict[str, Any]) -> None:
+    first, again = (list(script["train"](8, 3, duration=0.5)) for _ in range(2))
+    assert first[-1].average > first[0].average + 0.05
+    assert first[-1].best > first[0].best
+    for one, other in zip(first, again, strict=True):
+        assert one[:4] == other[:4]
+        np.testing.assert_array_equal(one.mean, other.mean)
+
+
+def test_hop_path_is_the_scenarios(script: dict[str, Any]) -> None:
+    rail = script["RAIL"]
+    played, record = script["on_path"](rail.servo), rollout.run(rail).record
+    np.testing.assert_array_equal(played.hip_z[:, 0], record["hip_z"])
