@@ -38,17 +38,18 @@ def check(
 ) -> int:
     """Run scenarios against their limits and baselines; exit status 1 if any is broken.
 
-    A baseline is baselines/NAME.json beside the scenario's file: what the metrics were, and how far
-    each may move. A metric that got worse than that fails; one that got better is reported.
+    The baseline of FILE.toml is baselines/FILE.json beside it: what the metrics were, and how far
+    each may move. A metric that got worse than that fails; one that got better is reported. Without
+    a baseline the limits alone decide.
 
     Args:
         scenarios: Names of shipped scenarios or paths of TOML files; none: all that ship.
         settings: Change one key of every scenario, as sim.timestep=0.0005; repeats.
         update: Record what is measured as the new baselines, of all runs that keep their limits.
         junit: Write the verdicts as JUnit XML.
-        summary: Append them as Markdown, for the page of a CI job ("$GITHUB_STEP_SUMMARY").
-        keep: Where the run directories of failed scenarios go, DIR/NAME; one that is there already
-            is replaced when its scenario fails again, and never deleted.
+        summary: Append the verdicts as Markdown, for the page of a CI job ("$GITHUB_STEP_SUMMARY").
+        keep: Where the run directories of failed scenarios go, each under its name; one there is
+            replaced when its scenario fails again, and never deleted.
         quiet: Print nothing but errors.
     """
     from fivebar_sim import baseline, check_report, console, resources, whole_file

@@ -28,8 +28,8 @@ def render(
 
     Args:
         run_dir: A run directory that `fivebar run` wrote.
-        out: The picture, .gif, .mp4 or .png (default NAME.gif).
-        fps: Frames a second.
+        out: The picture, .gif, .mp4 or .png (default NAME.gif, in the current folder).
+        fps: Frames a second, at most 50 in a .gif.
         speed: Of the run's time over the clock's; 0.25 is four times slower than real time.
         width: Of the picture [pixels].
         height: Of the picture [pixels].

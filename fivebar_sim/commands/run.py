@@ -35,9 +35,12 @@ def run(
 ) -> int:
     """Simulate scenarios, judge them by their limits, write their run directories.
 
+    Exit status: 1 if a limit is broken or a run breaks down, 2 for input that is wrong.
+
     Args:
         scenarios: Names of shipped scenarios or paths of TOML files; none: all that ship.
-        out: Run directory of one scenario, or the folder of several (default runs/NAME).
+        out: Run directory of one scenario, or the folder of several (default runs/NAME);
+            a run that is there is replaced.
         settings: Change one key of every scenario, as leg.L2=0.07 or "path.radii=[0.02, 0.01]";
             repeats. Another path.kind keeps the keys that both kinds have.
         live: Show the runs in a new Rerun viewer while they are simulated.
