@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import queue
+import re
 import socket
 import subprocess
 import sys
 import threading
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -36,6 +37,11 @@ RATE = 60.0
 LOOPBACK = ("127.0.0.1", "localhost", "::1")
 SWITCH = 5e-4
 """How long the sending thread may keep the physics' thread waiting for the interpreter [s]."""
+SETTINGS = bytes([0, 0, 0, 4, 0, 0, 0, 0, 0])
+"""An empty SETTINGS frame of HTTP/2: how either side of gRPC begins (RFC 9113)."""
+HELLO = b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n" + SETTINGS
+ANSWER = 2.0
+"""How long a viewer may take to answer that [s]."""
 PATIENCE = 20.0
 """How long a viewer may take to listen, and the last rows to be sent [s]."""
 
@@ -61,8 +67,7 @@ def streaming(planned: Plan, address: str) -> Iterator[Watch]:
         finally:
             sys.setswitchinterval(before)
             sender.finish()
-            stream.flush(timeout_sec=PATIENCE)
-            stream.disconnect()
+            _end(stream)
 
 
 def checked(address: str) -> str:
@@ -72,15 +77,32 @@ def checked(address: str) -> str:
         ConfigError: No HOST:PORT, a host that is not this one, or nobody listens.
     """
     host, colon, port = address.rpartition(":")
-    if not colon or not port.isdecimal() or not 0 < int(port) < 2**16:
+    if not colon or not re.fullmatch(r"\d{1,5}", port, re.ASCII) or not 0 < int(port) < 2**16:
         raise ConfigError(f"--live-at takes HOST:PORT, as 127.0.0.1:9876, got {address!r}")
     if host.strip("[]") not in LOOPBACK:
         raise ConfigError(f"--live-at must be on this machine, {', '.join(LOOPBACK)}, got {host!r}")
     try:
-        socket.create_connection((host.strip("[]"), int(port)), timeout=PATIENCE).close()
+        with socket.create_connection((host.strip("[]"), int(port)), timeout=ANSWER) as viewer:
+            viewer.sendall(HELLO)
+            if viewer.recv(5)[3:4] != SETTINGS[3:4]:
+                raise OSError("what answers there speaks no gRPC")
     except OSError as error:
-        raise ConfigError(f"no Rerun viewer listens at {address}: {error.strerror}") from None
+        said = error.strerror or error
+        raise ConfigError(f"no Rerun viewer listens at {address}: {said}") from None
     return address
+
+
+def _end(stream: rr.RecordingStream) -> None:
+    """Send what is left and let go; not for ever, as a viewer that has gone does not answer."""
+
+    def end() -> None:
+        with suppress(RuntimeError):  # the viewer was closed: the run itself has come to no harm
+            stream.flush(timeout_sec=PATIENCE)
+            stream.disconnect()
+
+    ending = threading.Thread(target=end, daemon=True)
+    ending.start()
+    ending.join(PATIENCE)
 
 
 def spawned() -> str:

@@ -9,7 +9,7 @@ import json
 import os
 import threading
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
@@ -100,7 +100,8 @@ def session() -> Iterator[None]:
             yield
         finally:
             rr.set_strict_mode(before)
-            rerun_bindings.flush_and_cleanup_orphaned_recordings()
+            with suppress(RuntimeError):  # of a live one whose viewer has gone
+                rerun_bindings.flush_and_cleanup_orphaned_recordings()
 
 
 def _encoded(runs: Sequence[Run], names: list[str]) -> bytes:

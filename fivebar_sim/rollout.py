@@ -13,7 +13,7 @@ import numpy as np
 from fivebar_sim import feedback, holding, metrics, model, motion
 from fivebar_sim.arrays import Array
 from fivebar_sim.control import Feedback, Setpoints
-from fivebar_sim.errors import ConfigError, DivergedError, FiveBarError
+from fivebar_sim.errors import ArgumentError, ConfigError, DivergedError, FiveBarError
 from fivebar_sim.metrics import Limit, Record
 from fivebar_sim.motion import Motion
 from fivebar_sim.provenance import provenance
@@ -229,7 +229,10 @@ def _result(planned: Plan, states: States) -> Result:
         far = f"it was {1e3 * scenario.leg.size:.4g} mm away from it at t = {lost:g} s"
         raise broken(planned, states, DivergedError(far, lost))
     start, clipped = planned.motion.q[0, ::2], saturated(planned, states)
-    measured = metrics.measure(scenario, record, start, clipped, states.warnings[0])
+    try:
+        measured = metrics.measure(scenario, record, start, clipped, states.warnings[0])
+    except ArgumentError as error:  # torques that no motor could have
+        raise broken(planned, states, DivergedError(str(error), scenario.sim.timestep)) from error
     limits = metrics.judge(measured, scenario.limits)
     good = all(limit.ok for limit in limits) and measured["branch"]["flips"] == 0
     measured["verdict"] = "pass" if good else "fail"

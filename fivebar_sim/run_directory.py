@@ -57,7 +57,9 @@ def check_place(path: Path) -> None:
     try:
         ours = path.is_dir() and (is_run(path) or not any(path.iterdir()))
         taken = not ours and (path.exists() or path.is_symlink())
-        there = next(p for p in path.absolute().parents if p.exists())
+        there = next((p for p in path.absolute().parents if p.exists()), path)
+        if path.resolve() == Path.cwd():
+            taken = True  # no system renames the folder it is in
     except OSError as error:
         raise RunDirectoryError(f"cannot write {path}: {error.strerror}") from None
     if taken:

@@ -12,6 +12,7 @@ from fivebar_sim import run_directory
 from fivebar_sim.errors import FiveBarError, RunDirectoryError
 from fivebar_sim.metrics import JOINT_COLUMNS, Record
 from fivebar_sim.scenario import Scenario
+from fivebar_sim.scenes import Ground, Treadmill
 
 COLUMNS = (
     *("time", "target_x", "target_z", "foot_x", "foot_z"),
@@ -55,6 +56,12 @@ def read(path: Path) -> StoredRun:
     except FiveBarError as error:
         raise RunDirectoryError(f"{path} is no run that can be read: {error}") from None
     record = _record(path / "rollout.parquet")
+    for name in _own_columns(scenario):
+        if name not in record:
+            raise RunDirectoryError(
+                f"{path / 'rollout.parquet'} is no record of the scene "
+                f"{scenario.scene.kind!r}: it lacks the column {name}"
+            )
     rows = len(record["time"])
     if rows != scenario.steps:
         raise RunDirectoryError(
@@ -62,6 +69,16 @@ def read(path: Path) -> StoredRun:
             f"{scenario.sim.timestep:g} s has {scenario.steps} rows, got {rows}"
         )
     return StoredRun(path, scenario, record, _metrics(path / "metrics.json"))
+
+
+def _own_columns(scenario: Scenario) -> list[str]:
+    """Return the columns that the scenario's scene adds."""
+    columns = []
+    if isinstance(scenario.scene, Ground):
+        columns += ["hip_z", "hip_dot_z", "ground_x", "ground_z"]
+    if isinstance(scenario.scene, Treadmill):
+        columns.append("belt_x")
+    return columns
 
 
 def _record(file: Path) -> Record:
@@ -99,7 +116,7 @@ def _metrics(file: Path) -> dict[str, Any]:
         metrics = json.loads(file.read_text(encoding="utf-8"))
     except OSError as error:
         raise RunDirectoryError(f"cannot read {file}: {error.strerror or error}") from None
-    except ValueError as error:
+    except (ValueError, RecursionError) as error:
         raise RunDirectoryError(f"{file} is not JSON: {error}") from None
     if not isinstance(metrics, dict) or metrics.get("verdict") not in ("pass", "fail"):
         raise RunDirectoryError(f"{file} has no verdict: it must be 'pass' or 'fail'")

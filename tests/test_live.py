@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import socket
+import subprocess
+import threading
+import time
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +14,7 @@ import rerun as rr
 from recorded import read
 from shell import Shell
 
-from fivebar_sim import live, rollout, simulate
+from fivebar_sim import live, recording_viewer, rollout, simulate
 from fivebar_sim.errors import ConfigError
 from fivebar_sim.scenario import Scenario
 
@@ -109,3 +112,53 @@ def test_trouble_while_sending_reaches_the_caller(
     plan = rollout.plan(Scenario.load("classic-ellipse", ["duration=0.9"]))
     with pytest.raises(OSError, match="no room"), live.streaming(plan, "127.0.0.1:9876") as watch:
         rollout.execute(plan, watch)
+
+
+@pytest.mark.parametrize("answer", [b"", b"HTTP/1.0 400 Bad request\r\n\r\n"])
+def test_who_speaks_no_grpc_is_no_viewer(answer: bytes, monkeypatch: pytest.MonkeyPatch) -> None:
+    """One that says nothing would keep a run waiting for ever; one that errs would lose it."""
+    monkeypatch.setattr(live, "ANSWER", 0.3)
+    with socket.create_server(("127.0.0.1", 0)) as server:
+
+        def serve() -> None:
+            connection = server.accept()[0]
+            connection.sendall(answer)
+            time.sleep(0.6)
+            connection.close()
+
+        thread = threading.Thread(target=serve)
+        thread.start()
+        with pytest.raises(ConfigError, match=r"^no Rerun viewer listens at 127\.0\.0\.1:\d+: "):
+            live.checked(f"127.0.0.1:{server.getsockname()[1]}")
+        thread.join()
+
+
+def test_viewer_that_is_closed_does_not_harm_the_run(tmp_path: Path) -> None:
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        address = f"127.0.0.1:{free.getsockname()[1]}"
+    command = [str(recording_viewer.binary()), "--serve-grpc", "--bind", "127.0.0.1", "--port"]
+    viewer = subprocess.Popen(
+        [*command, address.split(":")[1]],
+        env=recording_viewer.quiet(),
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+    )
+    try:
+        deadline = time.monotonic() + 20.0
+        while True:
+            try:
+                live.checked(address)
+                break
+            except ConfigError:
+                assert time.monotonic() < deadline
+                time.sleep(0.1)
+        plan = rollout.plan(Scenario.load("classic-ellipse", ["duration=0.9"]))
+        with live.streaming(plan, address) as watch:
+            viewer.kill()
+            viewer.wait()
+            result = rollout.execute(plan, watch)
+    finally:
+        viewer.kill()
+        viewer.wait()
+    assert result.write(tmp_path / "run").is_dir()

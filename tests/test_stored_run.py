@@ -55,6 +55,11 @@ def _changed(run: Path, column: str, value: object) -> None:
     pyarrow.parquet.write_table(pyarrow.table(table), file)
 
 
+def _without(run: Path, column: str) -> None:
+    file = run / "rollout.parquet"
+    pyarrow.parquet.write_table(pyarrow.parquet.read_table(file).drop_columns([column]), file)
+
+
 def _shortened(run: Path) -> None:
     file = run / "rollout.parquet"
     pyarrow.parquet.write_table(pyarrow.parquet.read_table(file).slice(0, 700), file)
@@ -70,6 +75,14 @@ def _shortened(run: Path) -> None:
         (_shortened, "a run of 0.8 s at 0.001 s has 800 rows, got 700"),
         (lambda run: (run / "rollout.parquet").write_bytes(b""), "is no record, or a damaged one"),
         (lambda run: (run / "metrics.json").write_text("{"), "metrics.json is not JSON: "),
+        (
+            lambda run: (run / "metrics.json").write_text("[" * 100_000),
+            "metrics.json is not JSON: ",
+        ),
+        (
+            lambda run: _without(run, "ground_z"),
+            "no record of the scene 'rail': it lacks the column",
+        ),
         (lambda run: (run / "metrics.json").write_text("{}"), "metrics.json has no verdict"),
         (lambda run: (run / "metrics.json").unlink(), "is no run directory: it lacks metrics.json"),
         (lambda run: (run / "scenario.toml").write_text("x = 1"), "is no run that can be read: "),

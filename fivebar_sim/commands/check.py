@@ -54,8 +54,7 @@ def check(
     """
     from fivebar_sim import baseline, check_report, console, resources, whole_file
 
-    if update and settings:
-        raise ConfigError("--update records scenarios as their files say: leave out --set")
+    _check_options(keep, updates_changed=update and bool(settings))
     sources = scenarios or tuple(resources.shipped("scenarios"))
     plans = plans_of(sources, settings)
     _check_names(plans)
@@ -74,6 +73,14 @@ def check(
     if summary is not None:
         whole_file.append(summary, check_report.markdown(checked))
     return status
+
+
+def _check_options(keep: Path, *, updates_changed: bool) -> None:
+    """Raise where options contradict each other, or name no place."""
+    if updates_changed:
+        raise ConfigError("--update records scenarios as their files say: leave out --set")
+    if keep == Path():
+        raise ConfigError("--keep must name a directory, got the current one")
 
 
 def _check_names(plans: list[Plan]) -> None:
