@@ -139,7 +139,7 @@ def _load(
     begun = np.maximum(record["time"][window] - h, 0.0)  # when the steps began
     phase = stance = None
     if path.period is not None:
-        phase = path.cycle(begun) if isinstance(path, Gait) else np.mod(begun / path.period, 1.0)
+        phase = path.cycle(begun)
     if "ground_z" in record:
         stance = ground.stands(record)[window]
     elif isinstance(path, Gait):

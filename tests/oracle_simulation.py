@@ -240,7 +240,7 @@ def eased_ellipse(
     """Return an ellipse that starts at rest at its lowest point towards +x.
 
         x = cx + rx sin(w s),   z = cz - rz cos(w s),   w = 2 pi frequency
-        s = T (6 k^3 - 8 k^4 + 3 k^5),  k = t / T  up to t = T, the ramp;   s = t  after it
+        ds/dt = 10 k^3 - 15 k^4 + 6 k^5,  k = t / T  up to t = T, the ramp;   s = t - T/2  after it
 
     Args:
         centre: (cx, cz) [m].
@@ -251,12 +251,12 @@ def eased_ellipse(
     (cx, cz), (rx, rz), w, T = centre, radii, 2.0 * math.pi * frequency, ramp
 
     def path(t: float) -> tuple[Pair, Pair, Pair]:
-        s, s1, s2 = t, 1.0, 0.0
+        s, s1, s2 = t - T / 2, 1.0, 0.0
         if t < T:
             k = t / T
-            s = T * (6 * k**3 - 8 * k**4 + 3 * k**5)
-            s1 = 18 * k**2 - 32 * k**3 + 15 * k**4
-            s2 = (36 * k - 96 * k**2 + 60 * k**3) / T
+            s = T * (5 * k**4 / 2 - 3 * k**5 + k**6)
+            s1 = 10 * k**3 - 15 * k**4 + 6 * k**5
+            s2 = (30 * k**2 - 60 * k**3 + 30 * k**4) / T
         sin, cos, w1, w2 = math.sin(w * s), math.cos(w * s), w * s1, w * s2
         v = (rx * cos * w1, rz * sin * w1)
         a = (rx * (cos * w2 - sin * w1**2), rz * (sin * w2 + cos * w1**2))

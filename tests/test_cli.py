@@ -157,7 +157,7 @@ def test_wrong_csv_is_one_line(shell: Shell, text: str, message: str) -> None:
 def test_diverging_timestep_exits_1_and_leaves_nothing(shell: Shell) -> None:
     said = shell.refused("run", "short.toml", *DIVERGING, "--quiet", status=1)
     assert said.startswith(
-        "short: the foot left its path at t = 0.02 s; the simulation broke down at t = 0.1 s: "
+        "short: the foot left its path at t = 0.02 s; the simulation broke down at t = 0.14 s: "
     )
     assert "try a timestep below 0.02 s" in said
 

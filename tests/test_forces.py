@@ -49,8 +49,8 @@ def test_stance_force_is_a_half_sine_of_the_planned_stance() -> None:
     np.testing.assert_array_equal(F[~stands], 0.0)
     assert np.all(F[stands, 1] >= 0.0)
     np.testing.assert_allclose(F[:, 0], -0.15 * F[:, 1], rtol=1e-14, atol=1e-15)
-    # after the ramp: touch-down at 0.35 s, the peak 0.15 s later, lift-off after 0.3 s
-    marks = force.at([0.35, 0.425, 0.5, 0.65 - 1e-12, 0.65 + 1e-12], GAIT)[:, 1]
+    # late by half the ramp: touch-down at 0.475 s, the peak 0.15 s later, lift-off after 0.3 s
+    marks = force.at([0.475, 0.55, 0.625, 0.775 - 1e-12, 0.775 + 1e-12], GAIT)[:, 1]
     np.testing.assert_allclose(marks, 20.0 * np.array([0.0, 0.5**0.5, 1.0, 0.0, 0.0]), atol=1e-9)
     # its impulse over a period: 2/pi peak times the stance
     window = (time >= 0.5) & (time < 1.0)
@@ -60,8 +60,8 @@ def test_stance_force_is_a_half_sine_of_the_planned_stance() -> None:
 def test_stance_force_keeps_to_the_ramp() -> None:
     force = Stance(peak=(0.0, 20.0))
     np.testing.assert_array_equal(force.at(0.0, GAIT), (0.0, 20.0))  # begins in mid-stance
-    tau = 0.4  # the phase is 0.25 s times 6 tau^3 - 8 tau^4 + 3 tau^5 there, behind the time
-    s = 0.25 * (6.0 * tau**3 - 8.0 * tau**4 + 3.0 * tau**5)
+    tau = 0.4  # the path's own time is 0.25 s times 5/2 tau^4 - 3 tau^5 + tau^6 there
+    s = 0.25 * (2.5 * tau**4 - 3.0 * tau**5 + tau**6)
     expected = 20.0 * math.sin(math.pi * (2.0 * s + 0.3) / 0.6)
     assert force.at(0.1, GAIT)[1] == pytest.approx(expected, rel=1e-12)
 

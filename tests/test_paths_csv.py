@@ -38,7 +38,8 @@ def test_csv_passes_through_its_points(tmp_path: Path) -> None:
     for periodic in (False, True):
         path = csv(tmp_path, table(), periodic=periodic)
         np.testing.assert_allclose(path.nominal(KNOTS).position, FEET, rtol=0.0, atol=1e-16)
-    assert csv(tmp_path, table()).end == KNOTS[-1]
+    path = csv(tmp_path, table(), ramp=0.2)
+    assert (path.span, path.end) == (KNOTS[-1], KNOTS[-1] + 0.1)
     # four points or fewer are one polynomial: two rows give the straight line
     two = csv(tmp_path, "time_s,x_m,z_m\n0,0,-0.08\n2,0.02,-0.07\n").nominal(0.5)
     np.testing.assert_allclose(two.position, (0.005, -0.0775), atol=1e-16)

@@ -95,8 +95,8 @@ def test_arch_is_its_formula(u: float, fall: float) -> None:
 def test_ramp_eases_the_stance_and_its_phase(time: float, ramp: float) -> None:
     path = Gait(centre=(0.0, -0.08), stride=0.03, lift=0.02, frequency=1.6, ramp=ramp)
     tau = min(time / ramp, 1.0)
-    s = time if time >= ramp else ramp * (6.0 * tau**3 - 8.0 * tau**4 + 3.0 * tau**5)
-    s_dot = 18.0 * tau**2 - 32.0 * tau**3 + 15.0 * tau**4
+    s = time - 0.5 * ramp if time >= ramp else ramp * (2.5 * tau**4 - 3.0 * tau**5 + tau**6)
+    s_dot = 10.0 * tau**3 - 15.0 * tau**4 + 6.0 * tau**5
     cycle = float(path.cycle(time))
     assert abs((cycle - 1.6 * s - 0.25 + 0.5) % 1.0 - 0.5) < 1e-12
     if path.in_stance(time):

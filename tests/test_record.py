@@ -135,7 +135,7 @@ def test_load_in_stance_is_that_of_the_steps_with_ground_force() -> None:
 def test_load_in_stance_without_a_ground_is_that_of_the_plan() -> None:
     plan, result = done("air", GAIT)
     window, h = plan.scenario.window, 1e-3
-    cycle = (np.arange(600) * h * 4 + 0.25) % 1.0  # from t = ramp on the path is the nominal one
+    cycle = ((np.arange(600) * h - 0.05) * 4 + 0.25) % 1.0  # half its ramp of 0.1 s late
     tau = pair(result, "torque")[window]
     rms = np.sqrt(np.mean(tau[(cycle < 0.5 - 1e-9)[window]] ** 2, axis=0))
     measured = result.metrics["load"]["stance"]["torque_rms"]
@@ -144,11 +144,12 @@ def test_load_in_stance_without_a_ground_is_that_of_the_plan() -> None:
 
 
 def test_phases_are_those_of_the_steps_begin() -> None:
-    """The histogram over a period is that of `load.measure` at t mod T of each step's start."""
+    """The histogram over a period is that of `load.measure` where the path is at each step's start."""
     plan, result = done("air")
     window = plan.scenario.window
     theta = np.concatenate([plan.motion.q[:1, [0, 2]], pair(result, "theta")])
-    phase = np.mod(np.arange(window.start, window.stop) * 1e-3 * 4.0, 1.0)
+    begun = result.record["time"][window] - 1e-3
+    phase = np.mod((begun - 0.05) * 4.0, 1.0)  # half its ramp of 0.1 s late
     turned = theta[window.start : window.stop + 1]
     expected = load.measure(pair(result, "torque")[window], turned, 1e-3, phase=phase)
     assert result.metrics["load"] == {**expected, "saturated": {"A": 0.0, "E": 0.0}}

@@ -58,7 +58,7 @@ def test_oracle_tracking_of_the_plain_servo(integrator: str) -> None:
     assert error == pytest.approx(1.19e-3, rel=0.01)
     assert result.metrics["tracking"]["rms"] == pytest.approx(error, rel=0.02)
     # the foot itself: of first order, a part of what it moves in a step at its peak speed
-    step = 1.512 * 0.02 * 4 * np.pi * 1e-3
+    step = 0.02 * 4 * np.pi * 1e-3
     assert np.linalg.norm(foot(result) - true.foot, axis=-1).max() < 0.15 * step
 
 

@@ -49,12 +49,13 @@ class FootPath(
 ):
     """A foot path p(t), begun from rest.
 
-    A kind of path overrides `nominal`, the path at its own time, and `period` if it repeats, `end`
-    if it stops, or `rest` if it ends in a hold.
+    A kind of path overrides `nominal`, the path at its own time, and `period` if it repeats, `span`
+    if it stops, or `moves` if it ends in a hold.
 
     Attributes:
         needs_ground: Whether the path means nothing without a ground under the foot.
-        ramp: How long the path takes to reach its own speed, from rest [s]; 0 starts at speed.
+        ramp: How long the path takes to reach its own speed, from rest [s]; from then on it is half
+            of that late, see `at`. 0 starts at speed, and on time.
         outside: What becomes of targets that the leg cannot reach: "refuse" the path, or go to the
             "nearest" point that it reaches; see `motion.plan`.
     """
@@ -73,14 +74,24 @@ class FootPath(
         return None
 
     @property
-    def end(self) -> float:
-        """Last time at which the path is defined [s]; inf if it goes on for ever."""
+    def span(self) -> float:
+        """How long the path is defined at its own time [s]; inf if it goes on for ever."""
         return math.inf
 
     @property
-    def rest(self) -> float:
-        """Time from which the foot is held for ever [s]; inf if it never is."""
+    def moves(self) -> float:
+        """How long the foot moves at the path's own time, before it is held [s]; inf if it never is."""
         return math.inf
+
+    @property
+    def end(self) -> float:
+        """Last time at which the path is defined, span + ramp / 2 [s]; may be inf."""
+        return self.span + 0.5 * self.ramp
+
+    @property
+    def rest(self) -> float:
+        """Time from which the foot is held for ever, moves + ramp / 2 [s]; may be inf."""
+        return self.moves + 0.5 * self.ramp
 
     def nominal(self, time: ArrayLike) -> Sample:
         """Return the path at its own time, without the ramp.
@@ -92,21 +103,21 @@ class FootPath(
             Foot in the hip frame, shapes (..., 2).
 
         Raises:
-            ArgumentError: Unless every time is in [0, end].
+            ArgumentError: Unless every time is in [0, span].
         """
         raise NotImplementedError
 
     def at(self, time: ArrayLike) -> Sample:
         """Return the path, eased from rest within the ramp.
 
-        The nominal path p is run through at the phase time s(t), with T = ramp, tau = t / T:
+        The nominal path p is run through at its own time s(t), with T = ramp, tau = t / T:
 
-            s / T = 6 tau^3 - 8 tau^4 + 3 tau^5   for t < T,   s = t   from then on
+            s' = 10 tau^3 - 15 tau^4 + 6 tau^5   for t < T,   s = t - T / 2   from then on
             position = p(s),   velocity = p' s',   acceleration = p'' s'^2 + p' s''
 
-        s, s' and s'' are 0 at t = 0 and T, 1 and 0 at t = T. So the foot starts from rest, and
-        from t = ramp on this is the nominal path at the same time t, not a delayed one. The price:
-        within the ramp the speed peaks at s' = 1.512 times the nominal one, at tau = 0.6.
+        s' rises from 0 at t = 0 to 1 at t = T, s'' is 0 at both. So the foot starts from rest and
+        is never faster than on the nominal path: the start asks no more of motors and loop than the
+        path itself. The price: from t = ramp on this is the nominal path half a ramp late.
 
         Args:
             time: [s], shape (...).
@@ -117,13 +128,30 @@ class FootPath(
         Raises:
             ArgumentError: Unless every time is in [0, end].
         """
-        s, s_dot, s_ddot = (rate[..., None] for rate in eased(self._times(time), self.ramp))
+        t = times(time, self.end)
+        s, s_dot, s_ddot = (rate[..., None] for rate in eased(t, self.ramp))
         p = self.nominal(s[..., 0])
         return Sample(
             position=p.position,
             velocity=p.velocity * s_dot,
             acceleration=p.acceleration * s_dot**2 + p.velocity * s_ddot,
         )
+
+    def cycle(self, time: ArrayLike) -> Array:
+        """Return how far the path is in its period, as eased in `at`.
+
+        Args:
+            time: [s], shape (...).
+
+        Returns:
+            s / period, wrapped into [0, 1), shape (...).
+
+        Raises:
+            ArgumentError: A path that does not repeat, or times outside [0, inf).
+        """
+        if self.period is None:
+            raise ArgumentError("a path that does not repeat has no cycle")
+        return np.mod(eased(times(time, self.end), self.ramp)[0] / self.period, 1.0)
 
     def resolve(self, folder: Path) -> Self:
         """Return the path with its files read and checked; names are relative to folder.
@@ -135,8 +163,8 @@ class FootPath(
         return self
 
     def _times(self, time: ArrayLike) -> Array:
-        """Return times as an array [s], those past the end by rounding set to the end."""
-        return times(time, self.end)
+        """Return times of the nominal path [s], those past its span by rounding set to the span."""
+        return times(time, self.span)
 
 
 class Cyclic(FootPath, frozen=True):
@@ -181,10 +209,10 @@ def times(time: ArrayLike, end: float) -> Array:
 
 
 def eased(time: Array, ramp: float) -> tuple[Array, Array, Array]:
-    """Return the phase time s [s] of `FootPath.at` with its rates s' and s'' [1/s].
+    """Return the path's own time s [s] of `FootPath.at` with its rates s' and s'' [1/s].
 
-        s = T (6 tau^3 - 8 tau^4 + 3 tau^5),   s' = 18 tau^2 - 32 tau^3 + 15 tau^4,
-        s'' = (36 tau - 96 tau^2 + 60 tau^3) / T,   tau = t / T   for t < T = ramp
+        s = T (5/2 tau^4 - 3 tau^5 + tau^6),   s' = 10 tau^3 - 15 tau^4 + 6 tau^5,
+        s'' = 30 tau^2 (1 - tau)^2 / T,   tau = t / T   for t < T = ramp;   s = t - T / 2 after it
 
     Args:
         time: t >= 0 [s], any shape.
@@ -193,21 +221,21 @@ def eased(time: Array, ramp: float) -> tuple[Array, Array, Array]:
     if ramp == 0.0:
         return time, np.ones_like(time), np.zeros_like(time)
     tau = np.minimum(time, ramp) / ramp
-    s = np.where(time < ramp, ramp * tau**3 * (6.0 - 8.0 * tau + 3.0 * tau**2), time)
-    s_dot = tau**2 * (18.0 - 32.0 * tau + 15.0 * tau**2)
-    s_ddot = tau * (36.0 - 96.0 * tau + 60.0 * tau**2) / ramp
+    s = np.where(time < ramp, ramp * tau**4 * (2.5 - 3.0 * tau + tau**2), time - 0.5 * ramp)
+    s_dot = tau**3 * (10.0 - 15.0 * tau + 6.0 * tau**2)
+    s_ddot = 30.0 * tau**2 * (1.0 - tau) ** 2 / ramp
     return s, s_dot, s_ddot
 
 
 def check_ramp(path: FootPath) -> None:
-    """Raise unless the ramp is over when the path comes to rest: else it would rest later.
+    """Raise unless the ramp is shorter than what the path moves: else it might rest within it.
 
     Raises:
-        ArgumentError: Unless ramp <= rest.
+        ArgumentError: Unless ramp <= moves.
     """
-    if not path.ramp <= path.rest:
+    if not path.ramp <= path.moves:
         raise ArgumentError(
-            f"ramp must be in [0, {path.rest:g}] s, the time that the path moves, got "
+            f"ramp must be in [0, {path.moves:g}] s, the time that the path moves, got "
             f"{path.ramp:g} s"
         )
 

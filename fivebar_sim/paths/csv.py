@@ -44,21 +44,21 @@ class Csv(FootPath, frozen=True, tag="csv", dict=True):
     Attributes:
         file: Name of the CSV, relative to the scenario's folder (unresolved: the current one).
         periodic: Whether the path repeats, smoothly across the seam; else it ends with its file.
-        cycle: The key `period` of a table: the period, where the rule above is not meant [s].
+        given: The key `period` of a table: the period, where the rule above is not meant [s].
     """
 
     file: str
     periodic: bool = False
-    cycle: float | None = msgspec.field(default=None, name="period")
+    given: float | None = msgspec.field(default=None, name="period")
 
     def __post_init__(self) -> None:
         super().__post_init__()
         if not self.file or "\0" in self.file:
             raise ArgumentError(f"file must be the name of a CSV file, got {self.file!r}")
-        if self.cycle is not None:
-            check_number("period", self.cycle, "s", low=0.0, strict=True)
+        if self.given is not None:
+            check_number("period", self.given, "s", low=0.0, strict=True)
             if not self.periodic:
-                raise ArgumentError(f"period needs periodic = true, got {self.cycle!r} s without")
+                raise ArgumentError(f"period needs periodic = true, got {self.given!r} s without")
 
     @property
     def period(self) -> float | None:
@@ -66,7 +66,7 @@ class Csv(FootPath, frozen=True, tag="csv", dict=True):
         return self._curve.period
 
     @property
-    def end(self) -> float:
+    def span(self) -> float:
         """The sampled span [s], or inf if the path is periodic."""
         return self._curve.span if self._curve.period is None else math.inf
 
@@ -76,7 +76,7 @@ class Csv(FootPath, frozen=True, tag="csv", dict=True):
         The boundary is periodic, or else "not-a-knot".
 
         Raises:
-            ArgumentError: Unless every time is in [0, end].
+            ArgumentError: Unless every time is in [0, span].
             ConfigError: What `resolve` would raise, if the file was not read yet.
         """
         spline, _, period = self._curve
@@ -107,7 +107,7 @@ class Csv(FootPath, frozen=True, tag="csv", dict=True):
                     f"lasts, got {self.ramp:g} s"
                 )
             return _Curve(CubicSpline(*track, bc_type="not-a-knot"), track.span, None)
-        time, foot = _closed(track, self.cycle, self.file)
+        time, foot = _closed(track, self.given, self.file)
         return _Curve(CubicSpline(time, foot, bc_type="periodic"), track.span, float(time[-1]))
 
 

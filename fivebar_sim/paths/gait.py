@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike
 
 from fivebar_sim.arrays import Array, Bools
 from fivebar_sim.checks import check_number
-from fivebar_sim.paths.base import FARTHEST, Cyclic, Pair, Sample, check_pair, eased
+from fivebar_sim.paths.base import FARTHEST, Cyclic, Pair, Sample, check_pair, eased, times
 from fivebar_sim.paths.quintic import STEEPEST, arch, pieces
 
 
@@ -19,9 +19,9 @@ class Gait(Cyclic, frozen=True, tag="gait"):
     front; see `nominal`.
 
     Within the ramp all speeds are those of `FootPath.at`, s' times the nominal ones: the stance
-    speed rises from 0, passes its nominal value at ramp / 3, peaks at 1.512 times that, and is back
-    at t = ramp. A belt that runs at the constant `stance_speed` slips against the foot until then.
-    With ramp <= duty / (2 frequency) all of it happens in the first stance.
+    speed rises from 0 to its nominal value at t = ramp. A belt that runs at the constant
+    `stance_speed` slips against the foot until then. With ramp <= duty / frequency all of it
+    happens in the first stance.
 
     Attributes:
         centre: (x, z) of the middle of the stance line [m]; z is that of the ground.
@@ -68,7 +68,7 @@ class Gait(Cyclic, frozen=True, tag="gait"):
         Raises:
             ArgumentError: Unless every time is in [0, inf).
         """
-        return self._cycle(eased(self._times(time), self.ramp)[0])
+        return self._cycle(eased(times(time, self.end), self.ramp)[0])
 
     def in_stance(self, time: ArrayLike) -> Bools:
         """Return whether the foot is planned to stand, from touch-down until before lift-off.

@@ -47,8 +47,8 @@ class Lines(FootPath, frozen=True, kw_only=True, tag="lines"):
         check_ramp(self)
 
     @property
-    def rest(self) -> float:
-        """Time from which the foot is held at the last point: the sum of seconds [s]."""
+    def moves(self) -> float:
+        """How long the foot moves to the last point: the sum of seconds [s]."""
         return float(self._knots()[-1])
 
     def nominal(self, time: ArrayLike) -> Sample:

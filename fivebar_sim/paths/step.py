@@ -37,8 +37,8 @@ class Step(FootPath, frozen=True, kw_only=True, tag="step"):
         check_ramp(self)
 
     @property
-    def rest(self) -> float:
-        """Time from which the foot is held at stop: seconds [s]."""
+    def moves(self) -> float:
+        """How long the foot moves to stop: seconds [s]."""
         return self.seconds
 
     def nominal(self, time: ArrayLike) -> Sample:

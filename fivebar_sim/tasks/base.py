@@ -14,7 +14,7 @@ from fivebar_sim.control import Observation
 from fivebar_sim.control_step import whole_steps
 from fivebar_sim.errors import ArgumentError, ConfigError, unknown
 from fivebar_sim.geometry import FiveBar
-from fivebar_sim.paths import FootPath, Gait
+from fivebar_sim.paths import FootPath
 from fivebar_sim.scenes import Ground, Scene
 from fivebar_sim.sensors import Sensors
 from fivebar_sim.servo import Drive, Integrator, Servo
@@ -262,4 +262,4 @@ def periodic(path: FootPath, time: Array) -> Array:
     if path.period is None:
         kind = path.__struct_config__.tag
         raise ConfigError(f"the path must be a periodic one, for its phase; got kind {kind!r}")
-    return turning(path.cycle(time) if isinstance(path, Gait) else time / path.period)
+    return turning(path.cycle(time))
