@@ -12,6 +12,7 @@ from rich.markup import escape
 from rich.measure import Measurement
 from rich.table import Table
 
+from fivebar_sim import guards
 from fivebar_sim.metrics import Limit, look_up
 
 if TYPE_CHECKING:
@@ -47,12 +48,20 @@ SHOWN = {
     "ground.slip": ("slip in stance", 1e3, "mm"),
     "ground.foot_height_max": ("foot height max", 1e3, "mm"),
     "ground.flight_max": ("longest flight", 1e3, "ms"),
+    "energy.motor": ("work of the motors", 1e3, "mJ"),
+    "energy.ground": ("work of the ground", 1e3, "mJ"),
+    "energy.constraints": ("work of loop, gears, ends", 1e3, "mJ"),
+    "energy.turnover": ("energy turned over", 1e3, "mJ"),
+    "energy.imbalance": ("energy unaccounted for", 1e2, "%"),
     "branch.flips": ("branch flips", 1.0, ""),
     "warnings": ("MuJoCo warnings", 1.0, ""),
 }
 """What a metric is called, the factor from SI to the shown unit, and that unit."""
 
-DETAILS = ("load.work", "load.opposing", "load.peak_ratio", "load.rms_ratio", "load.saturated")
+DETAILS = (
+    *("load.work", "load.opposing", "load.peak_ratio", "load.rms_ratio", "load.saturated"),
+    *("energy.motor", "energy.ground", "energy.constraints", "energy.turnover"),
+)
 """Metrics that are shown only where they have a limit, or where motors saturate."""
 
 
@@ -100,9 +109,8 @@ def print_result(result: Result, where: str, console: Console) -> None:
         judged = (bounds(limit), verdict(limit.ok)) if limit else ("", "")
         table.add_row(label, shown(key, look_up(result.metrics, key)), *judged)
     console.print(table)
-    flip = result.metrics["branch"]["first_flip"]
-    if flip is not None:
-        console.print(f"[red]the leg left its branch at t = {flip:g} s[/red]")
+    for said in guards.broken(result.metrics["guards"]):
+        console.print(f"[red]{said}[/red]", soft_wrap=True)
     console.print(
         f"verdict: {verdict(result.verdict == 'pass')}   written to {escape(where)}", soft_wrap=True
     )

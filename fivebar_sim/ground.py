@@ -21,18 +21,29 @@ def height(leg: FiveBar, record: Mapping[str, Array]) -> Array:
     return record["hip_z"] + record["foot_z"] - leg.foot_radius
 
 
+def contact_radius(leg: FiveBar, height: Array) -> Array:
+    """Return how far below the ball's centre MuJoCo has the point of contact [m].
+
+    The ball's radius less half of what it sinks in.
+
+    Args:
+        leg: The leg.
+        height: Of the ball above the floor, as `height` returns it [m].
+    """
+    return leg.foot_radius + 0.5 * np.minimum(height, 0.0)
+
+
 def slid(leg: FiveBar, record: Mapping[str, Array]) -> Array:
     """Return how far the foot slid over the floor in each step but the first [m], (N - 1,).
 
     The ball rolls with L2, whose direction is psi_2 = theta_A + theta_B, and a belt that moves by
-    belt_x takes its point of contact along. Over a step, with r the ball's radius less half of what
-    it sinks in, which is where MuJoCo has that point:
+    belt_x takes its point of contact along. Over a step, with r of `contact_radius`:
 
         d foot_x + r d psi_2 - d belt_x
     """
     psi_2 = record["theta_A"] + record["theta_B"]
     belt = record.get("belt_x", np.zeros_like(psi_2))
-    r = leg.foot_radius + 0.5 * np.minimum(height(leg, record), 0.0)
+    r = contact_radius(leg, height(leg, record))
     return np.diff(record["foot_x"] - belt) + 0.5 * (r[1:] + r[:-1]) * np.diff(psi_2)
 
 

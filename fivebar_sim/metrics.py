@@ -1,4 +1,4 @@
-"""What a run is judged by: foot tracking, loop closure, load of the two motors, branch."""
+"""What a run is judged by: foot tracking, loop closure, load of the motors, energy, branch."""
 
 from __future__ import annotations
 
@@ -7,10 +7,11 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from fivebar_sim import ground, kinematics, load
+from fivebar_sim import energy, ground, guards, kinematics, load
 from fivebar_sim.arrays import Array, Bools
 from fivebar_sim.geometry import FiveBar
 from fivebar_sim.paths import Gait
+from fivebar_sim.scenes import Ground
 
 if TYPE_CHECKING:
     from fivebar_sim.scenario import Scenario
@@ -53,6 +54,11 @@ LIMIT_KEYS = (
     "load.saturated.A",
     "load.saturated.E",
     *GROUND_KEYS,
+    "energy.motor",
+    "energy.ground",
+    "energy.constraints",
+    "energy.turnover",
+    "energy.imbalance",
     "branch.flips",
     "warnings",
 )
@@ -69,37 +75,62 @@ class Limit(NamedTuple):
     ok: bool
 
 
-def measure(
-    scenario: Scenario,
-    record: Mapping[str, Array],
-    start: Array,
-    saturated: Bools,
-    warnings: int,
-) -> dict[str, Any]:
+class Unrecorded(NamedTuple):
+    """What a run did besides its record.
+
+    Attributes:
+        steps: What acted, and where it began.
+        saturated: Whether the torque limit clipped A and E in each step, (N, 2).
+        unsolved: Whether MuJoCo's solver ran out of iterations in each step, (N,).
+        warnings: MuJoCo's warnings.
+    """
+
+    steps: energy.Steps
+    saturated: Bools
+    unsolved: Bools
+    warnings: int
+
+
+def measure(scenario: Scenario, record: Mapping[str, Array], besides: Unrecorded) -> dict[str, Any]:
     """Return the metrics of a run, in SI units.
 
     With e = |foot - target| over the window, tracking.rms = sqrt(mean e^2); load is that of
     `load.measure`, and saturated the part of the steps in which the torque limit clipped. closure
-    is the loop gap over the whole run, and branch looks at every step of it.
+    is the loop gap over the whole run, energy that of `energy.measure`; branch and guards look at
+    every step.
 
     Args:
         scenario: What was run.
         record: The columns of rollout.parquet.
-        start: (theta_A, theta_E) at t = 0 [rad], (2,).
-        saturated: Whether the torque limit clipped A and E in each step, (N, 2).
-        warnings: MuJoCo's warnings.
+        besides: What its record does not say.
     """
+    leg, scene = scenario.leg, scenario.scene
+    start, saturated = besides.steps.start[-4::2], besides.saturated
+    trunk = scene.mass if isinstance(scene, Ground) else 0.0
+    works = energy.works(energy.Body(leg, scenario.payload, trunk), record, besides.steps)
+    branch = _branch(leg, record)
+    guarded = guards.judge(
+        scenario.guards,
+        leg,
+        record,
+        branch=branch,
+        saturated=saturated,
+        works=works,
+        unsolved=besides.unsolved,
+    )
     window = scenario.window
     error, gap = tracking_error(record)[window], record["gap"]
     measured = {
         "tracking": {"rms": _rms(error), "max": float(error.max())},
         "closure": {"rms": _rms(gap), "max": float(gap.max())},
         "load": _load(scenario, record, start, saturated),
-        "branch": _branch(scenario.leg, record),
-        "warnings": int(warnings),
+        "energy": energy.measure(works),
+        "branch": branch,
+        "guards": [{**guard._asdict(), "ok": guard.ok} for guard in guarded],
+        "warnings": int(besides.warnings),
     }
     if "ground_z" in record:
-        measured["ground"] = ground.measure(scenario.leg, record, window)
+        measured["ground"] = ground.measure(leg, record, window)
     return measured
 
 

@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from fivebar_sim import kinematics
+from fivebar_sim import energy, kinematics
 from fivebar_sim.arrays import Array, Bools
 from fivebar_sim.errors import DivergedError
-from fivebar_sim.metrics import JOINT_COLUMNS, Record, left_path
+from fivebar_sim.metrics import JOINT_COLUMNS, Record, Unrecorded, left_path
 from fivebar_sim.scenes import Ground, Treadmill
 from fivebar_sim.servo import Drive, applied_torque
 from fivebar_sim.servo import saturated as clipped
@@ -82,6 +82,17 @@ def _torque(planned: Plan, states: States, begin: int) -> Array:
         q_next[:, MOTORS],
         v_next[:, MOTORS],
         _drive(planned),
+    )
+
+
+def unrecorded(planned: Plan, states: States) -> Unrecorded:
+    """Return what a run did besides its record."""
+    pushes, limit = states.ctrl[0, :, :-2], planned.model.opt.iterations
+    return Unrecorded(
+        steps=energy.Steps(planned.start, states.constraint[0], pushes),
+        saturated=saturated(planned, states),
+        unsolved=states.iterations[0] >= limit,
+        warnings=int(states.warnings[0]),
     )
 
 

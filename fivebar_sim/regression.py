@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from fivebar_sim import guards
 from fivebar_sim.baseline import LESS_IS_BETTER, Baseline, Recorded
 from fivebar_sim.console import SHOWN, bounds, shown
 from fivebar_sim.metrics import Limit, look_up
@@ -48,7 +49,7 @@ class Checked(NamedTuple):
     Attributes:
         name: The scenario's.
         rows: Its metrics that have a limit or a baseline.
-        broke: Why the run itself failed: it diverged, or left its branch; "" if it did not.
+        broke: Why the run itself failed: it diverged, or passed a guard; "" if it did not.
         notes: What should be known besides: no baseline, or one that was made otherwise.
     """
 
@@ -92,11 +93,9 @@ def accept(checked: Checked) -> Checked:
 
 def _broke(result: Result) -> str:
     """Return why a run failed, if not by its limits."""
-    flip = result.metrics["branch"]["first_flip"]
-    if flip is not None:
-        return f"the leg left its branch at t = {flip:g} s"
+    passed = "; ".join(guards.broken(result.metrics["guards"]))
     unexplained = result.verdict != "pass" and all(limit.ok for limit in result.limits)
-    return "the run's own verdict is fail" if unexplained else ""
+    return passed or ("the run's own verdict is fail" if unexplained else "")
 
 
 def _notes(baseline: Baseline | None, metrics: Mapping[str, Any]) -> Iterator[str]:

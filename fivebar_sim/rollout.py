@@ -17,7 +17,7 @@ from fivebar_sim.errors import ArgumentError, ConfigError, DivergedError, FiveBa
 from fivebar_sim.metrics import Limit, Record
 from fivebar_sim.motion import Motion
 from fivebar_sim.provenance import provenance
-from fivebar_sim.record import broken, columns, saturated
+from fivebar_sim.record import broken, columns, unrecorded
 from fivebar_sim.scenario import Scenario
 from fivebar_sim.scenes import Ground, Payload
 from fivebar_sim.simulate import States, Watch, check, simulate
@@ -228,13 +228,12 @@ def _result(planned: Plan, states: States) -> Result:
     if lost is not None:
         far = f"it was {1e3 * scenario.leg.size:.4g} mm away from it at t = {lost:g} s"
         raise broken(planned, states, DivergedError(far, lost))
-    start, clipped = planned.motion.q[0, ::2], saturated(planned, states)
     try:
-        measured = metrics.measure(scenario, record, start, clipped, states.warnings[0])
+        measured = metrics.measure(scenario, record, unrecorded(planned, states))
     except ArgumentError as error:  # torques that no motor could have
         raise broken(planned, states, DivergedError(str(error), scenario.sim.timestep)) from error
     limits = metrics.judge(measured, scenario.limits)
-    good = all(limit.ok for limit in limits) and measured["branch"]["flips"] == 0
+    good = all(limit.ok for limit in limits) and all(each["ok"] for each in measured["guards"])
     measured["verdict"] = "pass" if good else "fail"
     measured["limits"] = [
         {**limit._asdict(), "low": None if limit.low == -np.inf else limit.low} for limit in limits

@@ -12,43 +12,26 @@ import numpy as np
 
 from fivebar_sim import forces, paths, resources, scenario_table, tables
 from fivebar_sim.arrays import Array
-from fivebar_sim.checks import check_number
 from fivebar_sim.control import Feedback, Setpoints
 from fivebar_sim.errors import ArgumentError, ConfigError, unknown
 from fivebar_sim.forces import FootForce
 from fivebar_sim.geometry import FiveBar
+from fivebar_sim.guards import Guards
 from fivebar_sim.metrics import GROUND_KEYS, LIMIT_KEYS
 from fivebar_sim.paths import FootPath, Gait
 from fivebar_sim.scenes import Air, Ground, Payload, Scene, Treadmill
 from fivebar_sim.sensors import Sensors
-from fivebar_sim.servo import Integrator, Servo
+from fivebar_sim.servo import Servo
+from fivebar_sim.sim import Sim
 from fivebar_sim.tables import Table
 
 MOST_STEPS = 5_000_000
-"""Physics steps of one run: what its arrays need, about 500 bytes a step, must fit in memory."""
+"""Physics steps of one run: what its arrays need, about 600 bytes a step, must fit in memory."""
 
 KEYS = (
     *("name", "leg", "scene", "duration", "path", "force", "servo", "sensors", "controller"),
-    *("sim", "limits"),
+    *("sim", "guards", "limits"),
 )
-
-
-class Sim(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """How the run is simulated.
-
-    Attributes:
-        timestep: h [s].
-        integrator: MuJoCo's integrator, "discrete" or "implicitfast".
-        seed: Of everything random in a run, as the sensors' noise.
-    """
-
-    timestep: float = 0.001
-    integrator: Integrator = "discrete"
-    seed: int = 0
-
-    def __post_init__(self) -> None:
-        check_number("timestep", self.timestep, "s", low=0.0, strict=True)
-        check_number("seed", self.seed, "", low=0)
 
 
 class Scenario(msgspec.Struct, frozen=True, kw_only=True):
@@ -67,6 +50,7 @@ class Scenario(msgspec.Struct, frozen=True, kw_only=True):
         servo: The servos at A and E.
         sensors: What a feedback controller sees of them.
         sim: Timestep, integrator, seed.
+        guards: How far the run may go and still be one.
         limits: Metric's dotted key to (low, high).
     """
 
@@ -81,6 +65,7 @@ class Scenario(msgspec.Struct, frozen=True, kw_only=True):
     servo: Servo = Servo()
     sensors: Sensors = Sensors()
     sim: Sim = Sim()
+    guards: Guards = Guards()
     limits: dict[str, tuple[float, float]] = {}
 
     @property
@@ -165,6 +150,7 @@ class Scenario(msgspec.Struct, frozen=True, kw_only=True):
             servo=scenario_table.servo(table.get("servo", {}), where, folder),
             sensors=tables.convert(table.get("sensors", {}), Sensors, "sensors", where),
             sim=tables.convert(table.get("sim", {}), Sim, "sim", where),
+            guards=tables.convert(table.get("guards", {}), Guards, "guards", where),
             limits=tables.bounds(table.get("limits", {}), LIMIT_KEYS, "limits", where),
         )
         _check_window(scenario, where)
@@ -194,6 +180,7 @@ class Scenario(msgspec.Struct, frozen=True, kw_only=True):
             },
             "sensors": msgspec.to_builtins(self.sensors),
             "sim": msgspec.to_builtins(self.sim),
+            "guards": msgspec.to_builtins(self.guards),
             "limits": {
                 key: high if low == -math.inf else [low, high]
                 for key, (low, high) in self.limits.items()

@@ -17,6 +17,9 @@ from fivebar_sim.model import quiet
 STATE = mujoco.mjtState.mjSTATE_FULLPHYSICS | mujoco.mjtState.mjSTATE_CTRL
 """What is recorded of every step: time, qpos, qvel, ctrl."""
 
+STEP = ("qfrc_constraint", "solver_niter")
+"""What is recorded of every step besides."""
+
 CHUNK = 50_000
 """Steps, over all legs, between two moments at which an interrupt is heard: about 0.2 s."""
 
@@ -40,6 +43,8 @@ class States(NamedTuple):
         ctrl: The commands of the step, (nsim, N, nu).
         ground: Force (x, z) of the ground on the foot during the step [N], (nsim, N, 2); without a
             ground (nsim, N, 0).
+        constraint: Joint forces of all constraints during the step [N m] (hinges), (nsim, N, nv).
+        iterations: Of the constraint solver in the step, (nsim, N).
         warnings: MuJoCo's warnings of each simulation so far, (nsim,).
     """
 
@@ -48,6 +53,8 @@ class States(NamedTuple):
     qvel: Array
     ctrl: Array
     ground: Array
+    constraint: Array
+    iterations: Array
     warnings: Array
 
     @classmethod
@@ -111,7 +118,7 @@ class Legs:
             raise ArgumentError(f"ctrl must have shape ({nsim}, N, {nu}), got {ctrl.shape}")
         if not np.isfinite(ctrl).all():
             raise ArgumentError("ctrl must be finite: MuJoCo would reset the leg and go on")
-        record = (STATE,) if self._ground is None else (STATE, "sensordata")
+        record = (STATE, *STEP) if self._ground is None else (STATE, *STEP, "sensordata")
         with quiet():
             out = self._batch.rollout(ctrl.shape[1], ctrl, record=record)
         state, start = out[STATE], self._ground
@@ -124,15 +131,19 @@ class Legs:
             qvel=state[..., 1 + nq : 1 + nq + nv],
             ctrl=state[..., -nu:],
             ground=ground,
+            constraint=out["qfrc_constraint"],
+            iterations=out["solver_niter"].max(axis=-1),  # over the islands
             warnings=self._batch.warning[..., 1].sum(axis=1),  # (last info, count) of each kind
         )
 
     def nothing(self, steps: int) -> States:
         """Return room for the states of some steps, to be filled."""
         (nq, nv, nu), nsim = self._sizes, self._batch.nsim
-        sizes = (nq, nv, nu, 0 if self._ground is None else 2)
+        sizes = (nq, nv, nu, 0 if self._ground is None else 2, nv)
         fields = (np.empty((nsim, steps, size)) for size in sizes)
-        return States(np.empty((nsim, steps)), *fields, warnings=np.zeros(nsim, dtype=np.int64))
+        iterations: Any = np.empty((nsim, steps), dtype=np.int32)
+        warnings: Any = np.zeros(nsim, dtype=np.int64)
+        return States(np.empty((nsim, steps)), *fields, iterations=iterations, warnings=warnings)
 
 
 def simulate(

@@ -35,7 +35,7 @@ EXCESS = 1.0  # what a square radian beyond the bounds costs, per control step
 TRAINED, SHOWN = 2.0, 4.0  # [s], episodes
 PATH = "hop path, no limit"
 FINE = 0.001  # [s], control period of what is measured
-RAIL = Scenario.load("rail-hop")
+RAIL = Scenario.load("rail-hop", ["scene.drop=0"])  # an episode begins on the floor
 SERVO = msgspec.structs.replace(RAIL.servo, limit=1.0)  # [N m]
 
 Act = Callable[[int, Array], Array]

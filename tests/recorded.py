@@ -24,6 +24,7 @@ METRICS = {
     "closure": {"rms": 1e-7, "max": 3e-6},
     "load": {"share_A": None},
     "branch": {"working_mode": [-1, 1], "flips": 0},
+    "guards": [],
     "warnings": 0,
     "verdict": "fail",
     "provenance": {"versions": {"mujoco": "3.17"}, "seed": 0},

@@ -27,7 +27,7 @@ KEYS = sorted(ABSOLUTE)
 
 def result(values: dict[str, float | None], limits: dict[str, Any] | None = None) -> Result:
     """Return a result with some metrics."""
-    measured: dict[str, Any] = {"branch": {"first_flip": None, "flips": 0}}
+    measured: dict[str, Any] = {"guards": []}
     for key, value in values.items():
         *parents, last = key.split(".")
         table = measured
@@ -118,9 +118,18 @@ def test_rows_come_in_the_order_of_every_table() -> None:
 
 def test_lost_branch_and_unexplained_verdict_are_failures() -> None:
     good = result({"tracking.rms": 1e-3})
-    flipped = good.metrics | {"verdict": "fail", "branch": {"first_flip": 0.25, "flips": 1}}
-    checked = regression.compare(good._replace(metrics=flipped), None)
-    assert checked.failures == ["the leg left its branch at t = 0.25 s"]
+    passed = [
+        {"name": "branch", "value": 1.0, "high": 0.0, "time": 0.25, "ok": False},
+        {"name": "loop", "value": 1e-3, "high": 2e-3, "time": None, "ok": True},
+        {"name": "torque", "value": 0.7, "high": 0.5, "time": 0.6, "ok": False},
+    ]
+    checked = regression.compare(
+        good._replace(metrics=good.metrics | {"verdict": "fail", "guards": passed}), None
+    )
+    assert checked.failures == [
+        "the leg left its branch at t = 0.25 s; a motor's torque had been clipped for more than "
+        "0.5 s of a second at t = 0.6 s, for 0.7 s at worst"
+    ]
     failed = good._replace(metrics=good.metrics | {"verdict": "fail"})
     assert regression.compare(failed, None).failures == ["the run's own verdict is fail"]
 

@@ -34,7 +34,10 @@ def runs(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     asked = {
         "_odd $a$ & <b>": ("classic-ellipse", ["duration=0.8", "limits.tracking.rms=1e-9"]),
         "limited": ("classic-ellipse", ["duration=0.8", "servo.limit=0.02"]),
-        "trot": ("treadmill-trot", ["duration=0.7"]),
+        "trot": (
+            "treadmill-trot",
+            ["duration=0.7", "path.ramp=0.1", "limits={tracking={rms=1e-3}}"],
+        ),
     }
     for name, (scenario, settings) in asked.items():
         loaded = Scenario.load(scenario, [*settings, f'leg.name="{EVIL}"'])
@@ -249,6 +252,8 @@ def _with(key: str, value: object) -> Callable[[Path], object]:
         (_with("branch.first_flip", "x"), "first_flip and phase must be numbers, got 'x'"),
         (_with("load.phase.share_A", [0.5]), "the lists of load.phase must be of one length"),
         (_with("load.phase", {"share_A": []}), "load.phase is not share_A and torque_rms"),
+        (_with("guards", [{"name": "loop"}]), "guards are not those of a run"),
+        (_with("guards", MISSING), "guards are not those of a run"),
     ],
 )
 def test_damage_is_refused(

@@ -205,7 +205,7 @@ def test_name_that_is_no_file_name_is_refused(tmp_path: Path, name: str) -> None
 @pytest.mark.parametrize(
     ("setting", "message"),
     [
-        ("duratoin=1", "unknown key 'duratoin'; known: controller, duration, force, leg,"),
+        ("duratoin=1", "unknown key 'duratoin'; known: controller, duration, force, guards,"),
         ("name=1", "name must be a plain file name of 1 to 200 bytes, got 1"),
         (
             "scene=aire",

@@ -128,6 +128,8 @@ def states(**changes: np.ndarray) -> States:
         qvel=np.zeros((1, 10, 4)),
         ctrl=np.zeros((1, 10, 2)),
         ground=np.zeros((1, 10, 0)),
+        constraint=np.zeros((1, 10, 4)),
+        iterations=np.ones((1, 10), dtype=np.int32),
         warnings=np.zeros(1, dtype=int),
     )
     simulate.check(good, 1e-3)

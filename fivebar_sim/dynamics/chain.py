@@ -20,6 +20,7 @@ integrator of one leg calls it a hundred thousand times.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -57,7 +58,7 @@ def placed(e: Vector, r: Vector) -> Vector:
 
 
 class Pose(NamedTuple):
-    """A closed pose: directions (x, z) of L1..L4, and how they turn with the motors.
+    """A pose: directions (x, z) of L1..L4, and how those turn with the motors if it is closed.
 
     Attributes:
         e1: Along AB.
@@ -74,10 +75,10 @@ class Pose(NamedTuple):
     e2: Vector
     e3: Vector
     e4: Vector
-    a2: Scalar
-    b2: Scalar
-    a3: Scalar
-    b3: Scalar
+    a2: Scalar = math.nan
+    b2: Scalar = math.nan
+    a3: Scalar = math.nan
+    b3: Scalar = math.nan
 
 
 @dataclass(frozen=True, slots=True)
@@ -261,12 +262,12 @@ class Chain:
         det = M_AA * M_EE - M_AE * M_AE
         return (M_EE * t_A - M_AE * t_E) / det, (M_AA * t_E - M_AE * t_A) / det
 
-    def energies(self, p: Pose, w1: Scalar, w4: Scalar) -> Vector:
-        """Return the kinetic energy and the potential one, zero at O [J].
+    def energies(self, p: Pose, w: Four) -> Vector:
+        """Return the kinetic energy and the potential one, zero at O [J]; the loop may be open.
 
         psi_dot^T H psi_dot / 2,   -gravity . (moments of mass about O)
         """
-        w2, w3 = p.a2 * w1 + p.b2 * w4, p.a3 * w1 + p.b3 * w4
+        w1, w2, w3, w4 = w
         H12, H43 = self.couplings(p)
         turning = self.I1 * w1 * w1 + self.I2 * w2 * w2 + self.I3 * w3 * w3 + self.I4 * w4 * w4
         lift = sum(dot(r, self.leg.gravity) for r in (self.hung, *self.moments(p)))

@@ -232,7 +232,9 @@ def energy(
     """
     chain = Chain.of(leg, assembly, payload)
     theta, w = _pairs(theta=theta, theta_dot=theta_dot)
-    kinetic, potential = chain.energies(chain.pose(*_split(theta)), *_split(w))
+    p, (w1, w4) = chain.pose(*_split(theta)), _split(w)
+    rates = w1, p.a2 * w1 + p.b2 * w4, p.a3 * w1 + p.b3 * w4, w4
+    kinetic, potential = chain.energies(p, rates)
     return Energy(np.asarray(kinetic), np.asarray(potential))
 
 

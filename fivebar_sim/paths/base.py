@@ -80,7 +80,7 @@ class FootPath(
 
     @property
     def moves(self) -> float:
-        """How long the foot moves at the path's own time, before it is held [s]; inf if it never is."""
+        """How long the foot moves at the path's own time [s]; inf if it is never held."""
         return math.inf
 
     @property

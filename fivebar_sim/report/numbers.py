@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from fivebar_sim import metrics, tables
+from fivebar_sim import guards, metrics, tables
 from fivebar_sim.arrays import Array
 from fivebar_sim.checks import is_finite
 from fivebar_sim.console import SHOWN
@@ -44,6 +44,10 @@ def check(run: StoredRun) -> None:
     bad = [value for value in numbers if value is not None and not is_finite(value)]
     if bad:
         raise RunDirectoryError(f"{file}: first_flip and phase must be numbers, got {bad[0]!r}")
+    try:
+        guards.broken(run.metrics["guards"])
+    except (KeyError, TypeError, ValueError):
+        raise RunDirectoryError(f"{file}: guards are not those of a run") from None
 
 
 def _phase(run: StoredRun, file: Path) -> list[Any]:

@@ -6,7 +6,7 @@ import shlex
 
 import tomli_w
 
-from fivebar_sim import tables
+from fivebar_sim import guards, tables
 from fivebar_sim.checks import is_finite
 from fivebar_sim.console import SHOWN, bounds, shown
 from fivebar_sim.metrics import look_up
@@ -56,16 +56,13 @@ def _head(run: StoredRun) -> str:
         f"Tracking and load are measured from {window.start * h:.4g} s to {window.stop * h:.4g} s, "
         f"the loop gap over the whole run."
     )
-    flip = metrics["branch"].get("first_flip")
-    left = (
-        [] if flip is None else [f'<p class="fail">The leg left its branch at t = {flip:g} s.</p>']
-    )
+    passed = [f'<p class="fail">{text(said)}</p>' for said in guards.broken(metrics["guards"])]
     word = "pass" if good else "fail"
     return "\n".join(
         [
             f"<header>\n<h1>{text(scenario.name)}</h1>",
             f'<p><span class="verdict {word}">{"PASS" if good else "FAIL"}</span></p>',
-            *left,
+            *passed,
             f"<p>{text(about)}</p>\n</header>",
         ]
     )

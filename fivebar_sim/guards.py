@@ -1,0 +1,159 @@
+"""What makes a run no evidence, whatever its limits say.
+
+Physics that does not hold, torque that is not there, a leg that has become another one.
+
+A scenario may move the bounds in its table [guards]; that the leg keeps its branch and MuJoCo's
+solver converges is not up to it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+import msgspec
+import numpy as np
+
+from fivebar_sim import ground
+from fivebar_sim.arrays import Array, Bools
+from fivebar_sim.checks import check_number
+from fivebar_sim.energy import Works
+from fivebar_sim.geometry import FiveBar
+
+WITHIN = 1.0
+"""The time [s] within which clipped torque is added up."""
+
+
+class Guards(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """How far a run may go and still be one.
+
+    Attributes:
+        loop: Greatest gap of the loop at C, in parts of the leg's size.
+        ground: Deepest that the foot may sink into the floor, in parts of its ball's diameter.
+        torque: Longest that a motor's torque may be clipped within any second [s].
+        energy: Greatest imbalance of the energy, in parts of what was turned over.
+    """
+
+    loop: float = 0.01
+    ground: float = 1.0
+    torque: float = 0.5
+    energy: float = 0.01
+
+    def __post_init__(self) -> None:
+        check_number("loop", self.loop, "", low=0.0)
+        check_number("ground", self.ground, "", low=0.0)
+        check_number("torque", self.torque, "s", low=0.0)
+        check_number("energy", self.energy, "", low=0.0)
+
+
+class Guard(NamedTuple):
+    """One guard and what came of it.
+
+    Attributes:
+        name: What it looks at.
+        value: What was found, in SI units; None where there is nothing to find.
+        high: Greatest value that is fine.
+        time: When it was first passed [s]; None if it never was.
+    """
+
+    name: str
+    value: float | None
+    high: float
+    time: float | None
+
+    @property
+    def ok(self) -> bool:
+        """Whether it held."""
+        return self.time is None
+
+    def __str__(self) -> str:
+        """Return what it says where it was passed: the bound, when, and the worst of the run."""
+        what, worst, scale = SAID[self.name]
+        high, value = scale * self.high, scale * (self.value or 0.0)
+        return f"{what.format(high)} at t = {self.time:g} s{worst.format(value)}"
+
+
+SAID = {
+    "branch": ("the leg left its branch", "", 1.0),
+    "loop": ("the loop was open by more than {:.3g} mm", ", by {:.3g} mm at worst", 1e3),
+    "ground": ("the foot was in the floor by more than {:.3g} mm", ", by {:.3g} mm at worst", 1e3),
+    "torque": (
+        "a motor's torque had been clipped for more than {:.3g} s of a second",
+        ", for {:.3g} s at worst",
+        1.0,
+    ),
+    "energy": (
+        "more than {:.3g} % of the energy turned over was unaccounted for",
+        ", {:.3g} % at worst",
+        1e2,
+    ),
+    "solver": ("MuJoCo's solver did not converge", ", nor in {:.0f} steps in all", 1.0),
+}
+"""What a passed guard says: with its bound before the time and the worst value after it, both times
+a factor from SI."""
+
+
+def judge(
+    bounds: Guards,
+    leg: FiveBar,
+    record: Mapping[str, Array],
+    *,
+    branch: Mapping[str, Any],
+    saturated: Bools,
+    works: Works,
+    unsolved: Bools,
+) -> list[Guard]:
+    """Return every guard of a run, over all of its steps.
+
+    Args:
+        bounds: Of the scenario.
+        leg: The leg.
+        record: The columns of rollout.parquet.
+        branch: The metrics of that name.
+        saturated: Whether the torque limit clipped A and E in each step, (N, 2).
+        works: The work of each step.
+        unsolved: Whether the constraint solver ran out of iterations in each step, (N,).
+    """
+    time = record["time"]
+    found = [
+        Guard("branch", float(branch["flips"]), 0.0, branch["first_flip"]),
+        _highest("loop", record["gap"], bounds.loop * leg.size, time),
+        _highest("torque", _clipped(saturated, time), bounds.torque, time),
+        _energy(works, bounds.energy, time),
+        Guard("solver", float(unsolved.sum()), 0.0, _first(unsolved, time)),
+    ]
+    if "ground_z" in record:
+        depth = np.maximum(-ground.height(leg, record), 0.0)
+        found.append(_highest("ground", depth, bounds.ground * 2.0 * leg.foot_radius, time))
+    return found
+
+
+def broken(guards: list[Mapping[str, Any]]) -> list[str]:
+    """Return what the guards that were passed say, from the metrics of that name."""
+    known = (Guard(**{key: each[key] for key in Guard._fields}) for each in guards)
+    return [str(guard) for guard in known if not guard.ok]
+
+
+def _highest(name: str, values: Array, high: float, time: Array) -> Guard:
+    return Guard(name, float(values.max()), high, _first(values > high, time))
+
+
+def _first(chosen: Bools, time: Array) -> float | None:
+    return float(time[np.argmax(chosen)]) if chosen.any() else None
+
+
+def _clipped(saturated: Bools, time: Array) -> Array:
+    """Return how long the worse motor was clipped in the last second, at each step [s], (N,)."""
+    h = float(time[0])
+    steps = max(1, round(WITHIN / h))
+    so_far = np.concatenate([np.zeros((1, 2)), np.cumsum(saturated, axis=0)])
+    begin = np.maximum(np.arange(1, len(time) + 1) - steps, 0)
+    return h * (so_far[1:] - so_far[begin]).max(axis=1)
+
+
+def _energy(works: Works, high: float, time: Array) -> Guard:
+    off = np.abs(works.unaccounted)
+    imbalance = works.imbalance
+    if imbalance is None:
+        return Guard("energy", None, high, None)
+    return Guard("energy", imbalance, high, _first(off > high * works.turnover, time))

@@ -1,0 +1,179 @@
+"""The energy balance: against MuJoCo's own energies, as a law of every run, and what it notices."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import mujoco
+import numpy as np
+import pytest
+
+from fivebar_sim import energy, kinematics, model, resources, rollout
+from fivebar_sim.energy import Body, Steps
+from fivebar_sim.geometry import FiveBar
+from fivebar_sim.record import unrecorded
+from fivebar_sim.rollout import Plan, Result
+from fivebar_sim.scenario import Scenario
+from fivebar_sim.scenes import Ground, Payload, Rail
+from fivebar_sim.simulate import States, simulate
+
+PRESETS = tuple(resources.shipped("models/legs"))
+INTEGRATORS = ("discrete", "implicitfast")
+LANDING = ("rail-landing", "duration=1.2")
+
+
+def planned(name: str, *settings: str) -> Plan:
+    return rollout.plan(Scenario.load(name, ["limits={}", *settings]))
+
+
+def balance(result: Result) -> dict[str, float]:
+    return result.metrics["energy"]
+
+
+def ran(name: str, *settings: str) -> Result:
+    return rollout.execute(planned(name, *settings))
+
+
+def acted(plan: Plan) -> tuple[Body, Result, Steps]:
+    """Return what moved, the run, and what acted besides."""
+    scene = plan.scenario.scene
+    trunk = scene.mass if isinstance(scene, Ground) else 0.0
+    states: States = simulate(plan.model, plan.start[None], plan.ctrl[None])
+    body = Body(plan.scenario.leg, plan.scenario.payload, trunk)
+    return body, rollout.execute(plan), unrecorded(plan, states).steps
+
+
+# MuJoCo's energies
+
+
+@pytest.mark.parametrize("preset", PRESETS)
+def test_energies_are_mujocos(preset: str, rng: np.random.Generator) -> None:
+    """At random states of the open tree: knees anywhere, the loop far from closed."""
+    leg = FiveBar.load(preset)
+    scenes = [Payload(mass=0.3)]
+    if leg.gravity[1] != 0.0:
+        scenes.append(Rail(mass=0.7))  # pyright: ignore[reportArgumentType]
+    for scene in scenes:
+        built = model.build(leg, scene=scene)
+        built.opt.enableflags |= mujoco.mjtEnableBit.mjENBL_ENERGY
+        payload = scene.mass if isinstance(scene, Payload) else 0.0
+        trunk = scene.mass if isinstance(scene, Ground) else 0.0
+        body, data = Body(leg, payload, trunk), mujoco.MjData(built)
+        potential = []
+        for _ in range(6):
+            data.qpos[:] = rng.uniform(-3.0, 3.0, built.nq)
+            data.qvel[:] = rng.uniform(-9.0, 9.0, built.nv)
+            mujoco.mj_forward(built, data)
+            slide = built.nq == 5
+            hip, hip_dot = (data.qpos[0], data.qvel[0]) if slide else (0.0, 0.0)
+            ours = energy.mechanical(body, data.qpos[-4:], data.qvel[-4:], hip, hip_dot)
+            assert ours[0] == pytest.approx(data.energy[1], rel=1e-10)
+            potential.append(float(ours[1]) - data.energy[0])
+        # MuJoCo's is zero at another height, the same at all poses
+        np.testing.assert_allclose(potential, potential[0], atol=1e-12)
+
+
+def test_foot_rates_are_the_slope_of_the_foot(rng: np.random.Generator) -> None:
+    leg = FiveBar.load("extended")
+    q, v, step = rng.uniform(-3, 3, (50, 4)), rng.uniform(-5, 5, (50, 4)), 1e-6
+    ahead, back = (kinematics.chain_points(leg, q + s * step * v).F for s in (1, -1))
+    np.testing.assert_allclose(energy.foot_rates(leg, q, v), (ahead - back) / (2 * step), atol=1e-8)
+
+
+# the law
+
+
+@pytest.mark.parametrize("integrator", INTEGRATORS)
+@pytest.mark.parametrize(
+    "name", ["classic-ellipse", "payload-ellipse", "rail-landing", "treadmill-trot"]
+)
+def test_balance_closes_and_shrinks_with_the_step(name: str, integrator: str) -> None:
+    """What is left is of first order of the step: the turn of the links within it."""
+    coarse, fine = (
+        balance(ran(name, "duration=1.2", f"sim.timestep={h}", f"sim.integrator={integrator}"))
+        for h in (5e-4, 1.25e-4)
+    )
+    assert 0.0 < coarse["imbalance"] < 1e-3
+    assert fine["imbalance"] < 0.35 * coarse["imbalance"]
+
+
+def test_force_on_the_foot_does_its_work() -> None:
+    force = ("force={kind='constant', value=[1.0, -2.0]}", "scene.mass=0.1", "duration=1.2")
+    result = ran("payload-ellipse", *force)
+    found = balance(result)
+    foot = np.stack([result.record["foot_x"], result.record["foot_z"]], axis=-1)
+    # a constant force: its work is what it pushes the foot from start to end
+    pushed = foot[-1] - result.scenario.foot_path[0]
+    assert found["force"] == pytest.approx(pushed @ [1.0, -2.0], rel=5e-3)
+    assert found["force"] > 5e-3
+    assert found["imbalance"] < 1e-3
+
+
+def test_a_landing_loses_its_energy_in_motors_and_ground() -> None:
+    """5 cm and the squat: what trunk and leg fall by; the loop takes next to none of it."""
+    found = balance(ran(*LANDING))
+    assert found["potential"] == pytest.approx(-0.26, rel=0.02)
+    assert found["kinetic"] == pytest.approx(0.0, abs=1e-5)
+    assert found["motor"] + found["ground"] == pytest.approx(found["potential"], rel=1e-3)
+    assert found["motor"] < -0.1
+    assert found["ground"] < -0.05
+    assert abs(found["constraints"]) < 1e-3 * abs(found["ground"])
+
+
+def test_gear_friction_takes_its_part() -> None:
+    """Coulomb's: friction times the way that the motors turn."""
+    result = ran("classic-ellipse", "servo.friction=0.01", "duration=2.25")
+    turned = sum(np.abs(np.diff(result.record[f"theta_{motor}"])).sum() for motor in "AE")
+    assert balance(result)["constraints"] == pytest.approx(-0.01 * turned, rel=0.02)
+
+
+def test_a_leg_that_walks_drives_its_belt() -> None:
+    """What the ground takes is what the belt gets, and what is lost by sliding and sinking in."""
+    result = ran("treadmill-trot")
+    speed = result.scenario.scene.speed  # pyright: ignore[reportAttributeAccessIssue]
+    to_belt = speed * float(result.record["ground_x"].sum()) * 1e-3  # it moves towards -x
+    found = balance(result)
+    assert to_belt > 0.1
+    assert -2.0 * to_belt < found["ground"] < -to_belt
+    assert found["motor"] > to_belt
+
+
+def test_a_leg_at_rest_has_no_balance() -> None:
+    hold = "path={kind='line', start=[0,-0.08], stop=[0,-0.08], frequency=1, ramp=0}"
+    found = balance(ran("classic-ellipse", hold, "leg.gravity=[0,0]", "duration=1"))
+    assert found["turnover"] < energy.TINY
+    assert found["imbalance"] is None
+
+
+# what it notices
+
+
+@pytest.mark.parametrize("column", ["torque_A", "torque_E"])
+def test_a_wrong_torque_is_noticed(column: str) -> None:
+    body, result, steps = acted(planned(*LANDING))
+    right = energy.works(body, result.record, steps).imbalance
+    off = {**result.record, column: 1.05 * result.record[column]}
+    wrong = energy.works(body, off, steps).imbalance
+    assert right is not None
+    assert wrong is not None
+    assert right < 1e-4 < 100.0 * 1e-4 < wrong
+
+
+def test_a_wrong_mass_trunk_or_rotor_is_noticed() -> None:
+    body, result, steps = acted(planned(*LANDING))
+    for changed in (body._replace(payload=0.02), body._replace(trunk=1.05 * body.trunk)):
+        wrong = energy.works(changed, result.record, steps).imbalance
+        assert wrong is not None
+        assert wrong > 0.01
+    body, result, steps = acted(planned("classic-ellipse", "duration=1"))
+    light = dataclasses.replace(body.leg, armature=0.5 * body.leg.armature)
+    wrong = energy.works(body._replace(leg=light), result.record, steps).imbalance
+    assert wrong is not None
+    assert wrong > 0.01
+
+
+def test_a_forgotten_constraint_is_noticed() -> None:
+    body, result, steps = acted(planned("classic-ellipse", "servo.friction=0.01", "duration=1"))
+    wrong = energy.works(body, result.record, steps._replace(constraint=0.0 * steps.constraint))
+    assert wrong.imbalance is not None
+    assert wrong.imbalance > 0.5

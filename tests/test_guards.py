@@ -1,0 +1,148 @@
+"""Guards: each is passed by a run that is none, says when, and turns the verdict."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from shell import Shell
+
+from fivebar_sim import guards, rollout
+from fivebar_sim.errors import ArgumentError, ConfigError
+from fivebar_sim.geometry import FiveBar
+from fivebar_sim.guards import Guard, Guards
+from fivebar_sim.rollout import Result
+from fivebar_sim.scenario import Scenario
+
+CHATTER = (
+    *("controller.kp=150", "controller.kd=5", "controller.period=0.01", "servo.limit=1"),
+    "duration=2",
+)
+"""A loop that is too slow for its gains, and that the torque limit keeps near its path."""
+
+
+def ran(name: str, *settings: str) -> Result:
+    return rollout.run(Scenario.load(name, ["limits={}", *settings]))
+
+
+def passed(result: Result) -> dict[str, Guard]:
+    fields = Guard._fields
+    each = [Guard(**{key: row[key] for key in fields}) for row in result.metrics["guards"]]
+    return {guard.name: guard for guard in each if not guard.ok}
+
+
+# runs that are none
+
+
+@pytest.mark.parametrize(
+    ("name", "settings", "guard", "said"),
+    [
+        (
+            "rail-landing",
+            ("sim.integrator=implicitfast", "sim.timestep=0.002"),
+            "loop",
+            "the loop was open by more than 1 mm at t = 0.1",
+        ),
+        (
+            "rail-landing",
+            ("scene.drop=1.0",),
+            "ground",
+            "the foot was in the floor by more than 12 mm at t = 0.4",
+        ),
+        (
+            "airhockey-pd",
+            CHATTER,
+            "torque",
+            "a motor's torque had been clipped for more than 0.5 s of a second at t = 0.5",
+        ),
+        (
+            "classic-ellipse",
+            ("guards.energy=1e-5", "duration=1"),
+            "energy",
+            "more than 0.001 % of the energy turned over was unaccounted for at t = 0.",
+        ),
+    ],
+)
+def test_each_turns_the_verdict_and_says_when(
+    name: str, settings: tuple[str, ...], guard: str, said: str
+) -> None:
+    result = ran(name, *settings)
+    assert result.verdict == "fail"
+    assert list(passed(result)) == [guard]
+    assert str(passed(result)[guard]).startswith(said)
+    assert ran(name, *(s for s in settings if s[:2] in ("du", "pa"))).verdict == "pass"
+
+
+def test_time_is_that_of_the_first_step_past_the_bound() -> None:
+    result = ran("rail-landing", "scene.drop=1.0", "duration=1.2")
+    guard = passed(result)["ground"]
+    record, leg = result.record, result.scenario.leg
+    depth = leg.foot_radius - record["hip_z"] - record["foot_z"]
+    assert guard.high == 2.0 * leg.foot_radius
+    assert guard.value == pytest.approx(depth.max(), rel=1e-12)
+    assert guard.time == record["time"][np.flatnonzero(depth > 2.0 * leg.foot_radius)[0]]
+
+
+def test_solver_that_ran_out_of_iterations(monkeypatch: pytest.MonkeyPatch) -> None:
+    plan = rollout.plan(Scenario.load("rail-landing", ["limits={}", "duration=1.2"]))
+    plan.model.opt.iterations = 2
+    result = rollout.execute(plan)
+    guard = passed(result)["solver"]
+    assert result.verdict == "fail"
+    assert guard.time is not None
+    assert 0.09 < guard.time < 0.12  # the landing
+    assert str(guard).startswith(
+        f"MuJoCo's solver did not converge at t = {guard.time:g} s, nor in"
+    )
+
+
+def test_clipped_time_is_of_the_worse_motor_within_a_second() -> None:
+    """3 s at 10 ms: A is clipped every other step for a second, E for 0.3 s in one piece."""
+    time = np.arange(1.0, 301.0) * 0.01
+    saturated = np.zeros((300, 2), dtype=bool)
+    saturated[100:200:2, 0] = True
+    saturated[50:80, 1] = True
+    so_far = guards._clipped(saturated, time)
+    assert so_far.max() == pytest.approx(0.5)
+    assert time[so_far.argmax()] == pytest.approx(1.99)  # the fiftieth step
+    assert so_far[79] == pytest.approx(0.3)
+    assert so_far[-1] == 0.0
+
+
+def test_bounds_are_in_parts_of_the_leg() -> None:
+    long = ran("classic-ellipse", "duration=1", "guards.loop=0.02").metrics["guards"]
+    (loop,) = (each for each in long if each["name"] == "loop")
+    assert loop["high"] == pytest.approx(0.02 * FiveBar.load("classic").size)
+    assert {each["name"] for each in long} == {"branch", "loop", "torque", "energy", "solver"}
+
+
+# the edge
+
+
+def test_scenario_sets_and_keeps_them(tmp_path: Path) -> None:
+    scenario = Scenario.load("classic-ellipse", ["guards.torque=0.1"])
+    assert scenario.guards == Guards(torque=0.1)
+    assert Scenario.from_table(scenario.table(), "again", tmp_path) == scenario
+    with pytest.raises(ConfigError, match=r"\[guards\]: unknown key 'penetration'"):
+        Scenario.load("classic-ellipse", ["guards.penetration=1"])
+    with pytest.raises(ConfigError, match=r"guards\.loop must be in \[0, inf\), got -1"):
+        Scenario.load("classic-ellipse", ["guards.loop=-1"])
+    with pytest.raises(ArgumentError, match=r"torque must be in \[0, inf\) s, got -1"):
+        Guards(torque=-1)
+
+
+def test_everyone_is_told(shell: Shell) -> None:
+    chatter = [f"--set={setting}" for setting in ("limits={}", *CHATTER)]
+    words = "a motor's torque had been clipped for more than 0.5 s of a second at t = 0.5"
+    said = shell("run", "airhockey-pd", *chatter, "--out", "run")
+    assert said.status == 1
+    assert words in said.out
+    assert "verdict: FAIL" in said.out
+    said = shell("report", "run")
+    assert said.status == 0
+    assert words.replace("'", "&#x27;") in Path("run/report.html").read_text()
+    metrics = json.loads(Path("run/metrics.json").read_text())
+    assert not metrics["limits"]
+    assert metrics["verdict"] == "fail"
