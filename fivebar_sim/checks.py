@@ -50,3 +50,18 @@ def check_number(
     right = ")" if strict or math.isinf(high) else "]"
     legal = f"{left}{low:g}, {high:g}{right} {unit}".rstrip()
     raise error(f"{key} must be in {legal}, got {value!r}")
+
+
+FINEST = 1e-12
+"""The finest step of angles [rad]: a turn in a float has no much finer one."""
+
+
+def check_step(key: str, value: Any, *, high: float = math.inf) -> None:
+    """Raise unless value is a step that angles can be rounded to [rad], or 0 for none.
+
+    Raises:
+        ArgumentError: It is not in [0, high], or finer than `FINEST`: angles would overflow.
+    """
+    check_number(key, value, "rad", low=0.0, high=high)
+    if 0.0 < value < FINEST:
+        raise ArgumentError(f"{key} must be 0 or at least {FINEST:g} rad, got {value!r}")

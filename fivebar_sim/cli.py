@@ -2,36 +2,23 @@
 
 from __future__ import annotations
 
+import importlib
 import io
 import os
 import signal
 import sys
 import threading
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 
-import tyro
-
-from fivebar_sim import __version__
-from fivebar_sim.commands.check import check
-from fivebar_sim.commands.common import FAILED, INTERRUPTED, UNREAD, WRONG, say
-from fivebar_sim.commands.render import render
-from fivebar_sim.commands.replay import replay
-from fivebar_sim.commands.report import report
-from fivebar_sim.commands.run import run
-from fivebar_sim.commands.view import view
-from fivebar_sim.commands.workspace import workspace
+from fivebar_sim import __version__, memory
+from fivebar_sim.commands.status import FAILED, INTERRUPTED, UNREAD, WRONG, say
 from fivebar_sim.errors import DivergedError, FiveBarError
 
-COMMANDS = {
-    "run": run,
-    "check": check,
-    "replay": replay,
-    "report": report,
-    "render": render,
-    "view": view,
-    "workspace": workspace,
-}
+COMMANDS = ("run", "check", "replay", "report", "render", "view", "workspace")
+"""Each in the module of its name in `fivebar_sim.commands`."""
+
+HELP = {"-h", "--help"}
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -60,6 +47,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     except OSError as error:
         say(error)
         return WRONG
+    except MemoryError as error:
+        say(f"not enough memory: {error}")
+        return WRONG
 
 
 @contextmanager
@@ -81,14 +71,34 @@ def _terminable() -> Iterator[None]:
 
 
 def _dispatch(args: list[str]) -> int:
-    """Parse the arguments and call their command."""
+    """Call what the arguments say; a signal that ends an import ends the program as any other."""
+    try:
+        return _call(args)
+    except ImportError as error:
+        cause: BaseException | None = error
+        while cause and not isinstance(cause, (KeyboardInterrupt, SystemExit)):
+            cause = cause.__cause__  # modules in C++ raise their own error where they are stopped
+        raise cause or error from None
+
+
+def _call(args: list[str]) -> int:
+    """Parse the arguments and call their command; all else is imported here, within `main`."""
     if args == ["--version"]:
         print(f"fivebar-sim {__version__}")  # noqa: T201
         return 0
+    if not HELP & set(args):
+        memory.check()
+    import tyro
+
     return tyro.extras.subcommand_cli_from_dict(
-        COMMANDS,
+        {name: _command(name) for name in COMMANDS},
         prog="fivebar",
         description="Simulate closed-chain five-bar legs; measure tracking and load sharing.",
         args=args,
         config=(tyro.conf.FlagCreatePairsOff,),
     )
+
+
+def _command(name: str) -> Callable[..., int]:
+    """Return the function of a command."""
+    return getattr(importlib.import_module(f"fivebar_sim.commands.{name}"), name)

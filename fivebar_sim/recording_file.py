@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import os
+import re
 import tempfile
-import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
-from fivebar_sim import recording, stored_run
+from fivebar_sim import recording, recording_check, stored_run
 from fivebar_sim.errors import ConfigError
 
 RECORDING = "recording.rrd"
@@ -81,26 +81,12 @@ def readable(path: Path) -> bool:
     """Return whether the installed Rerun reads a recording, to its end.
 
     One of a newer Rerun counts as unreadable: what it cannot read of that it skips with a warning.
-    The store opens only with a whole footer, and the stream meets every other damage.
     """
-    from rerun.chunk import RrdReader
-
-    if not path.is_file() or newer(path):
-        return False
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # that there is no footer
-            reader = RrdReader(path)
-            reader.store()
-            for chunk in reader.stream():
-                del chunk
-    except (OSError, RuntimeError):
-        return False
-    return True
+    return path.is_file() and not newer(path) and recording_check.reads(path)
 
 
 def newer(path: Path) -> bool:
-    """Return whether a recording is of a newer Rerun than the installed one, by minor versions.
+    """Return whether a recording is of a newer Rerun than the installed one.
 
     Its first eight bytes are RRF2, then major, minor, patch, and what was before the release.
     """
@@ -108,5 +94,5 @@ def newer(path: Path) -> bool:
 
     with path.open("rb") as file:
         head = file.read(8)
-    here = [int(part) for part in rerun.__version__.split(".")[:2]]
-    return list(head[4:6]) > here
+    here = [int(part) for part in re.findall(r"\d+", rerun.__version__)[:3]]
+    return list(head[4:7]) > here

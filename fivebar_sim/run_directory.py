@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import os
 import shutil
@@ -12,7 +13,7 @@ from typing import TYPE_CHECKING
 
 import tomli_w
 
-from fivebar_sim import recording
+from fivebar_sim import leftovers, recording
 from fivebar_sim.arrays import Array
 from fivebar_sim.errors import RunDirectoryError
 
@@ -20,6 +21,13 @@ if TYPE_CHECKING:
     from fivebar_sim.rollout import Result
 
 FILES = ("scenario.toml", "metrics.json", "rollout.parquet", "recording.rrd")
+
+
+ATTEMPTS = 20
+"""How often a run directory is exchanged anew where others do the same."""
+
+OVERTAKEN = {errno.ENOENT, errno.ENOTEMPTY, errno.EEXIST}
+"""What a rename fails with if another one came in between."""
 
 
 def write(result: Result, path: Path) -> Path:
@@ -37,13 +45,15 @@ def write(result: Result, path: Path) -> Path:
     except OSError as error:
         raise RunDirectoryError(f"cannot write {path}: {error.strerror}") from None
     try:
-        _fill(stage, result)
-        stage.chmod(0o755)
-        _exchange(stage, path)
+        with leftovers.held(stage):
+            _fill(stage, result)
+            stage.chmod(0o755)
+            _exchange(stage, path)
     except OSError as error:
         raise RunDirectoryError(f"cannot write {path}: {error.strerror or error}") from None
     finally:
         shutil.rmtree(stage, ignore_errors=True)
+    leftovers.sweep(path)
     return path
 
 
@@ -98,15 +108,25 @@ def _fill(stage: Path, result: Result) -> None:
 
 
 def write_record(path: Path, record: Mapping[str, Array]) -> None:
-    """Write the record as Parquet, one column each."""
+    """Write the record as Parquet, one column each, with checksums: a damaged one is noticed."""
     import pyarrow
     import pyarrow.parquet
 
     with path.open("wb") as file:  # given a name, pyarrow would expand ~ and read it as a URI
-        pyarrow.parquet.write_table(pyarrow.table(dict(record)), file)
+        pyarrow.parquet.write_table(pyarrow.table(dict(record)), file, write_page_checksum=True)
 
 
 def _exchange(stage: Path, path: Path) -> None:
+    """Rename stage to path, over what others write there at the same time: the last wins."""
+    for left in reversed(range(ATTEMPTS)):
+        try:
+            return _renamed(stage, path)
+        except OSError as error:
+            if not left or error.errno not in OVERTAKEN:
+                raise
+
+
+def _renamed(stage: Path, path: Path) -> None:
     """Rename stage to path; what is there goes aside first, and is deleted last."""
     if not path.exists():
         stage.rename(path)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import msgspec
 
-from fivebar_sim.checks import check_number
+from fivebar_sim.checks import check_number, check_step
 
 
 class Sensors(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -28,4 +28,4 @@ class Sensors(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
         check_number("delay", self.delay, "s", low=0.0, high=10.0)
         check_number("noise", self.noise, "rad", low=0.0, high=10.0)
         check_number("rate_noise", self.rate_noise, "rad/s", low=0.0, high=1e6)
-        check_number("resolution", self.resolution, "rad", low=0.0, high=1.0)
+        check_step("resolution", self.resolution, high=1.0)

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from fivebar_sim import resources, tables
 from fivebar_sim.arrays import Array, Bools
-from fivebar_sim.checks import check_number
+from fivebar_sim.checks import check_number, check_step
 from fivebar_sim.errors import ArgumentError, ConfigError, unknown
 
 Integrator = Literal["discrete", "implicitfast"]
@@ -68,7 +68,7 @@ class Servo(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
         if self.rate is not None:
             check_number("rate", self.rate, "Hz", low=0.0, strict=True)
         check_number("delay", self.delay, "s", low=0.0)
-        check_number("resolution", self.resolution, "rad", low=0.0)
+        check_step("resolution", self.resolution)
 
     @classmethod
     def load(cls, source: str | Path) -> Servo:

@@ -88,10 +88,10 @@ def _record(file: Path) -> Record:
 
     try:
         with file.open("rb") as stream:  # given a name, pyarrow would expand ~ and read it as a URI
-            table = pyarrow.parquet.read_table(stream)
-    except OSError as error:
-        raise RunDirectoryError(f"cannot read {file}: {error.strerror or error}") from None
-    except pyarrow.ArrowException as error:
+            table = pyarrow.parquet.read_table(stream, page_checksum_verification=True)
+    except (OSError, pyarrow.ArrowException) as error:
+        if isinstance(error, OSError) and error.strerror:
+            raise RunDirectoryError(f"cannot read {file}: {error.strerror}") from None
         said = " ".join(str(error).split())
         raise RunDirectoryError(f"{file} is no record, or a damaged one: {said}") from None
     missing = [name for name in COLUMNS if name not in table.column_names]

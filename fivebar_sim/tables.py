@@ -11,6 +11,7 @@ from typing import Any, TypeVar, get_args, get_type_hints
 
 import msgspec
 
+from fivebar_sim import input_file
 from fivebar_sim.errors import ConfigError, unknown
 
 T = TypeVar("T")
@@ -24,6 +25,7 @@ def read(path: Path, what: str) -> Table:
         ConfigError: No such file, not readable, not TOML.
     """
     try:
+        input_file.check(path, input_file.TEXT)
         return _loads(path.read_text(encoding="utf-8-sig"))
     except OSError as error:
         raise ConfigError(f"cannot read {what} {path}: {error.strerror}") from None

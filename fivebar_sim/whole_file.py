@@ -14,6 +14,29 @@ from pathlib import Path
 from fivebar_sim.errors import ConfigError
 
 
+def check_place(path: Path) -> None:
+    """Raise unless a whole file may be written at path, as far as the system tells before.
+
+    Raises:
+        ConfigError: No file can be made there, or something else is there.
+    """
+    try:
+        _check_free(path)
+        there = next((p for p in path.absolute().parents if p.exists()), path)
+    except OSError as error:
+        raise ConfigError(f"cannot write {path}: {error.strerror or error}") from None
+    if not there.is_dir() or not os.access(there, os.W_OK | os.X_OK):
+        raise ConfigError(f"cannot write {path}: {there} is not a directory one may write in")
+
+
+def _check_free(path: Path) -> None:
+    """Raise if something is there that a file must not replace."""
+    if path.is_dir():
+        raise ConfigError(f"cannot write {path}: a directory is there")
+    if path.exists() and not path.is_file():  # a device would be renamed away
+        raise ConfigError(f"cannot write {path}: something that is no file is there")
+
+
 @contextmanager
 def beside(path: Path) -> Iterator[Path]:
     """Give a place beside a file to write to; it is renamed to the file if all goes well.
@@ -22,10 +45,7 @@ def beside(path: Path) -> Iterator[Path]:
         ConfigError: The file cannot be written.
     """
     try:
-        if path.is_dir():
-            raise ConfigError(f"cannot write {path}: a directory is there")
-        if path.exists() and not path.is_file():  # a device would be renamed away
-            raise ConfigError(f"cannot write {path}: something that is no file is there")
+        _check_free(path)
         handle, name = tempfile.mkstemp(prefix=".fivebar-", suffix=path.suffix, dir=path.parent)
         os.close(handle)
         stage = Path(name)

@@ -7,16 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 from tyro.conf import arg
 
-from fivebar_sim.commands.common import (
-    FAILED,
-    WRONG,
-    Scenarios,
-    Settings,
-    plans_of,
-    say,
-    screen,
-    working,
-)
+from fivebar_sim.commands.common import Scenarios, Settings, plans_of, screen, working
+from fivebar_sim.commands.status import FAILED, WRONG, say
 from fivebar_sim.errors import ConfigError, DivergedError, RunDirectoryError
 
 if TYPE_CHECKING:
@@ -60,6 +52,7 @@ def check(
     _check_names(plans)
     places = [baseline.place(source) for source in sources]
     olds = [baseline.read(place) for place in places]
+    _check_places(junit, summary)
     with working(f"checking {len(plans)} scenarios", quiet=quiet):
         results = _results(plans)
     checked = [_judge(*each) for each in zip(plans, results, olds, strict=True)]
@@ -81,6 +74,16 @@ def _check_options(keep: Path, *, updates_changed: bool) -> None:
         raise ConfigError("--update records scenarios as their files say: leave out --set")
     if keep == Path():
         raise ConfigError("--keep must name a directory, got the current one")
+
+
+def _check_places(junit: Path | None, summary: Path | None) -> None:
+    """Raise where the verdicts cannot be written, before anything is simulated."""
+    from fivebar_sim import whole_file
+
+    if junit is not None:
+        whole_file.check_place(junit)
+    if summary is not None:
+        whole_file.append(summary, "")
 
 
 def _check_names(plans: list[Plan]) -> None:

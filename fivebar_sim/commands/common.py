@@ -1,13 +1,13 @@
-"""What the commands share: their arguments' types, exit statuses, and how they speak."""
+"""What the commands share: their arguments' types, their plans, and what they print to."""
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Annotated
 
 from tyro.conf import Positional, UseAppendAction, arg
 
+from fivebar_sim import memory
 from fivebar_sim.errors import ConfigError, FiveBarError
 
 if TYPE_CHECKING:
@@ -15,8 +15,6 @@ if TYPE_CHECKING:
 
 Scenarios = Positional[Annotated[tuple[str, ...], arg(metavar="[SCENARIO ...]")]]
 Settings = UseAppendAction[Annotated[tuple[str, ...], arg(name="set", metavar="KEY=VALUE")]]
-
-FAILED, WRONG, INTERRUPTED, UNREAD = 1, 2, 130, 141
 
 
 def plans_of(scenarios: Iterable[str], settings: Sequence[str]) -> list[Plan]:
@@ -27,6 +25,7 @@ def plans_of(scenarios: Iterable[str], settings: Sequence[str]) -> list[Plan]:
     chosen = list(scenarios) or list(resources.shipped("scenarios"))
     loaded = [(source, Scenario.load(source, settings)) for source in chosen]
     plans = []
+    memory.check(sum(scenario.steps for _, scenario in loaded))
     for source, scenario in loaded:
         try:
             plans.append(rollout.plan(scenario))
@@ -52,8 +51,3 @@ def working(what: str, *, quiet: bool):
     from rich.text import Text
 
     return Console(stderr=True, quiet=quiet).status(Text(what))
-
-
-def say(error: BaseException | str) -> None:
-    """Print one line to stderr."""
-    print(f"fivebar: {' '.join(str(error).split())}", file=sys.stderr)  # noqa: T201

@@ -7,15 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 from tyro.conf import arg
 
-from fivebar_sim.commands.common import (
-    FAILED,
-    Scenarios,
-    Settings,
-    plans_of,
-    say,
-    screen,
-    working,
-)
+from fivebar_sim.commands.common import Scenarios, Settings, plans_of, screen, working
+from fivebar_sim.commands.status import FAILED, say
 from fivebar_sim.errors import ConfigError, DivergedError
 
 if TYPE_CHECKING:

@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from fivebar_sim import input_file
 from fivebar_sim.arrays import Array
 from fivebar_sim.errors import ConfigError, unknown
 
@@ -19,6 +20,9 @@ SAME_POINT = 1e-9
 
 LARGEST = 1e6
 """Upper end of numbers in a CSV: a kilometre in mm, eleven days in s, a meganewton in N."""
+
+SHORTEST = 1e-9
+"""Lower end of the time between two rows [s]: rates over shorter ones overflow."""
 
 
 class Track(NamedTuple):
@@ -53,7 +57,8 @@ def read_track(file: Path, headers: Headers, what: str) -> Track:
 
     Raises:
         ConfigError: The file cannot be read, is not UTF-8, has another header, a row with the wrong
-            number of cells, a cell that is no finite number, times that do not grow, or one row.
+            number of cells, a cell that is no finite number, times that do not grow by at least
+            `SHORTEST`, or one row.
     """
     lines = _lines(file, what)
     if not lines:
@@ -75,6 +80,11 @@ def read_track(file: Path, headers: Headers, what: str) -> Track:
                 f"{where}: times are {word}: time_s must be > {float(table[k - 1, 0])!r} s of line "
                 f"{rows[k - 1][0]}, got {float(table[k, 0])!r} s"
             )
+        if k > 0 and not table[k, 0] - table[k - 1, 0] >= SHORTEST:
+            raise ConfigError(
+                f"{where}: times are too close: time_s must be at least {SHORTEST:g} s after that "
+                f"of line {rows[k - 1][0]}, got {float(table[k, 0])!r} s"
+            )
     if len(rows) < 2:
         raise ConfigError(f"{file}: a {what} needs at least 2 rows, got {len(rows)}")
     return Track(table[:, 0] - table[0, 0], scale * table[:, 1:])
@@ -83,6 +93,7 @@ def read_track(file: Path, headers: Headers, what: str) -> Track:
 def _lines(file: Path, what: str) -> list[tuple[int, list[str]]]:
     """Return the lines that are neither blank nor comments, as (line number, stripped cells)."""
     try:
+        input_file.check(file, input_file.TABLE)
         raw = file.read_bytes()
     except OSError as error:
         raise ConfigError(f"cannot read {what} {file}: {error.strerror}") from None
