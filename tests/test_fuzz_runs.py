@@ -1,0 +1,149 @@
+"""Run directories damaged in any way, and command lines of any words: the law of fuzz.py."""
+
+from __future__ import annotations
+
+import functools
+import os
+import shutil
+import tempfile
+from pathlib import Path
+
+import fuzz_damage
+import numpy as np
+import pyarrow.parquet
+import pytest
+from fuzz import Bench, Law
+from fuzz_damage import Damage
+from hypothesis import strategies as st
+from shell import ELLIPSE
+
+from fivebar_sim import recording_check, rollout
+from fivebar_sim.recording_check import read_through
+from fivebar_sim.recording_file import RECORDING
+from fivebar_sim.scenario import Scenario
+
+
+@functools.cache
+def contents() -> dict[str, bytes]:
+    """Return the files of a sound run."""
+    settings = ["duration=0.8", "limits.tracking.rms=1e-3"]
+    with tempfile.TemporaryDirectory() as folder:
+        place = rollout.run(Scenario.load("rail-landing", settings)).write(Path(folder) / "mine")
+        return {name: (place / name).read_bytes() for name in fuzz_damage.FILES}
+
+
+@pytest.fixture
+def bench(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> Bench:
+    (tmp_path / "short.toml").write_text(ELLIPSE, encoding="utf-8")
+    _restore(tmp_path / "mine")
+    return Bench(tmp_path, monkeypatch, capfd)
+
+
+def _restore(place: Path) -> None:
+    """Make a run directory whole."""
+    shutil.rmtree(place, ignore_errors=True)
+    place.mkdir()
+    for name, content in contents().items():
+        (place / name).write_bytes(content)
+
+
+def _damaged(place: Path, damage: Damage) -> None:
+    """Do to a run directory what a damage says."""
+    file, other = place / damage.file, place / damage.other
+    if damage.how == "swapped":
+        file.write_bytes(contents()[damage.other])
+        other.write_bytes(contents()[damage.file])
+        return
+    file.unlink()
+    make = {
+        "missing": lambda: None,
+        "empty": file.touch,
+        "foreign": lambda: file.write_bytes(b"PAR1 and nothing of it"),
+        "directory": file.mkdir,
+        "link": lambda: file.symlink_to(damage.other),
+        "loop": lambda: file.symlink_to(file.name),
+        "dangling": lambda: file.symlink_to("nowhere"),
+        "device": lambda: file.symlink_to("/dev/zero"),
+        "pipe": lambda: os.mkfifo(file),
+    }
+    make.get(damage.how, lambda: file.write_bytes(damage.content))()
+
+
+def any_replay(bench: Bench, damage: Damage) -> None:
+    place = bench.folder / "mine"
+    _restore(place)
+    _damaged(place, damage)
+    with pytest.MonkeyPatch.context() as patch:
+        if RECORDING not in (damage.file, damage.other):  # a process for each would take too long
+            patch.setattr(recording_check, "reads", _reads_here)
+        said = bench.lawful("replay", "mine")
+    assert said.status == 2  # no screen, at the best
+    if "no screen here" in said.err:
+        bench.seen["read"] += 1
+        read_through(place / RECORDING)
+        _check_record(place)
+
+
+def _reads_here(path: Path) -> bool:
+    read_through(path)
+    return True
+
+
+def _check_record(place: Path) -> None:
+    """Fail if a record that was taken for sound is another one than was written."""
+    read = pyarrow.parquet.read_table(place / "rollout.parquet")
+    sound = pyarrow.parquet.read_table(pyarrow.BufferReader(contents()["rollout.parquet"]))
+    for name in sound.column_names:
+        np.testing.assert_array_equal(read[name].to_numpy(), sound[name].to_numpy(), name)
+
+
+def any_report(bench: Bench, damage: Damage) -> None:
+    place, page = bench.folder / "mine", bench.folder / "page.html"
+    _restore(place)
+    _damaged(place, damage)
+    said = bench.lawful("report", "mine", "--out", "page.html", "--quiet")
+    assert (said.status == 0) == page.exists()
+    if page.exists():
+        bench.seen["reported"] += 1
+        assert page.read_bytes().endswith(b"</html>\n")
+        _check_record(place)
+        page.unlink()
+
+
+def any_rerun(bench: Bench, damage: Damage) -> None:
+    _restore(bench.folder / "mine")
+    _damaged(bench.folder / "mine", damage)
+    bench.run("mine/scenario.toml")
+
+
+def any_words(bench: Bench, words: list[str]) -> None:
+    if "--web" in words or "render" in words:
+        return  # one serves until it is stopped, the other draws pictures
+    bench.lawful(*words)
+    for path in bench.folder.iterdir():
+        if path.name not in ("short.toml", "mine"):
+            shutil.rmtree(path) if path.is_dir() else path.unlink()
+
+
+SOUND = Damage("recording.rrd", "missing", b"", "metrics.json")
+SOME = st.deferred(lambda: fuzz_damage.damages(contents()))
+LAWS = {
+    "replay": Law(SOUND, SOME, any_replay, 8, 0.05),
+    "report": Law(SOUND, SOME, any_report, 2, 0.03),
+    "rerun": Law(SOUND, SOME, any_rerun, 6, 0.01),
+    "words": Law(["run", "short.toml"], fuzz_damage.arguments, any_words, 25, 0.01),
+}
+
+
+@pytest.mark.parametrize("name", LAWS)
+def test_few_inputs_keep_the_law(bench: Bench, name: str) -> None:
+    LAWS[name].try_few(bench)
+    assert len(bench.seen) > 1  # some are refused, some are not
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("name", LAWS)
+def test_many_inputs_keep_the_law(bench: Bench, name: str) -> None:
+    assert LAWS[name].try_many(bench) > 0
