@@ -11,11 +11,11 @@ far below what a change of the leg, the gains or the timing does. Measured on th
     MuJoCo 3.16, stepped by mj_step; NumPy 2.0; AVX disabled      the same bits
     MuJoCo 4.0                                                    4e-8 at most, relative
     every command and the start off by 1e-14, relative,
-        as on a processor that rounds otherwise                   5e-8 at most, relative
+        as on a processor that rounds otherwise                   a thousandth of a tolerance
 
-0.5 % is 100,000 times that, which leaves room for a later solver of MuJoCo's, and a twentieth of
-the 10 % that must never pass. The absolute part is for values that are next to nothing: 1 nm, a
-thousandth of a mN m, three steps of a window of 1500.
+`scripts/determinism.py` measures it. 0.5 % is 100,000 times what a version changes, which leaves
+room for a later solver of MuJoCo's, and a twentieth of the 10 % that must never pass. The absolute
+part is for values that are next to nothing: 1 nm, a thousandth of a mN m, three steps of 1500.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from typing import Any
 
 import msgspec
 
-from fivebar_sim import resources, tables, whole_file
+from fivebar_sim import input_file, resources, tables, whole_file
 from fivebar_sim.checks import check_number
 from fivebar_sim.errors import ConfigError
 from fivebar_sim.metrics import look_up
@@ -140,6 +140,7 @@ def read(path: Path) -> Baseline | None:
         ConfigError: It cannot be read, or is damaged or of something else; names file and key.
     """
     try:
+        input_file.check(path, input_file.TEXT)
         table = json.loads(path.read_text(encoding="utf-8"))
     except FileNotFoundError:
         return None

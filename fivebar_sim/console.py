@@ -52,7 +52,7 @@ SHOWN = {
     "energy.ground": ("work of the ground", 1e3, "mJ"),
     "energy.constraints": ("work of loop, gears, ends", 1e3, "mJ"),
     "energy.turnover": ("energy turned over", 1e3, "mJ"),
-    "energy.imbalance": ("energy unaccounted for", 1e2, "%"),
+    "energy.imbalance": ("energy imbalance", 1e2, "%"),
     "branch.flips": ("branch flips", 1.0, ""),
     "warnings": ("MuJoCo warnings", 1.0, ""),
 }

@@ -1,0 +1,171 @@
+"""The shipped scenarios: what they cover, how tight their limits are, what each of them sees."""
+
+from __future__ import annotations
+
+import math
+from functools import cache
+
+import faults_disturbed as disturbed
+import pytest
+
+from fivebar_sim import baseline, control, regression, resources, rollout, scenes
+from fivebar_sim.errors import FiveBarError
+from fivebar_sim.metrics import Limit
+from fivebar_sim.rollout import Plan, Result
+from fivebar_sim.scenario import Scenario
+from fivebar_sim.servo import Servo
+
+NAMES = sorted(resources.shipped("scenarios"))
+SCENARIOS = {name: Scenario.load(name) for name in NAMES}
+
+SOLIMP = "solimp of the loop 0.9 0.95"
+"""Under `discrete` the gap of a loop that carries next to nothing hardly depends on it: 0.6 %."""
+
+UNDAMPED = "motors 10 % more damped"
+"""Motors that are sent torques, and have no torque-speed line, have no damping in the model."""
+
+UNSEEN = {
+    "airhockey-gain-schedule": {UNDAMPED},
+    "airhockey-pd": {UNDAMPED, SOLIMP},
+    "classic-ellipse": {SOLIMP},
+    "classic-figure-eight": {SOLIMP},
+    "classic-pd-sensors": {SOLIMP},
+    "doggo-fast-ellipse": {UNDAMPED, SOLIMP},
+    "doggo-landing": {UNDAMPED},
+    "extended-gravity-hold": {UNDAMPED},
+    "extended-stance-force": {UNDAMPED},
+    "minitaur-trot": {SOLIMP},
+    "q8bot-trot": {SOLIMP},
+    "q8bot-xl330": {SOLIMP},
+}
+"""What a scenario does not see of a model that is disturbed, since there it makes no difference."""
+
+UNSEEN_LENGTHS = {
+    "doggo-fast-ellipse": {"L5"},  # symmetric legs: half of it on either side costs next to nothing
+    "minitaur-trot": {"L5"},
+    "q8bot-squat": {"L2"},  # stands the better for it
+    "q8bot-trot": {"L5"},
+}
+UNSEEN_GAINS = {
+    "airhockey-gain-schedule": {"kp_far", "kd_far"},  # 6.5 mm from the target, of 100, is near
+}
+UNTIMED = {"rail-landing"}
+"""Is sent the same angles all the time."""
+
+ERRORS = ("tracking.rms", "closure.max", "load.torque_rms.A", "load.torque_rms.E")
+"""What every scenario has limits of."""
+
+
+@cache
+def planned(name: str) -> Plan:
+    return rollout.plan(SCENARIOS[name])
+
+
+@cache
+def results() -> dict[str, Result]:
+    """Return what comes of all scenarios, simulated together on two threads."""
+    return dict(zip(NAMES, rollout.run_all([planned(n) for n in NAMES], nthread=2), strict=True))
+
+
+def red(result: Result) -> bool:
+    """Return whether a check of a run fails."""
+    recorded = baseline.read(baseline.place(result.scenario.name))
+    return bool(regression.compare(result, recorded).failures)
+
+
+def turn_red(plans: list[Plan]) -> list[bool]:
+    """Return which plans do not pass: they break down, or their check fails."""
+    try:
+        return [red(result) for result in rollout.run_all(plans, nthread=2)]
+    except FiveBarError:
+        return [True] if len(plans) == 1 else [turn_red([plan])[0] for plan in plans]
+
+
+# coverage
+
+
+def test_every_part_of_the_mission_is_driven() -> None:
+    every = list(SCENARIOS.values())
+    assert {s.leg.name for s in every} == set(resources.shipped("models/legs"))
+    assert {s.controller_name for s in every} == set(control.known())
+    assert {s.scene.kind for s in every} == set(scenes.KINDS)
+    assert {s.sim.integrator for s in every} == {"discrete", "implicitfast"}
+    shapes = {getattr(s.controller, "feedforward", None) for s in every}
+    assert shapes == {"none", "velocity", "torque", None}
+    servos = {name for name in resources.shipped("models/servos") if name != "ideal"}
+    assert {n for n in servos if Servo.load(n) in [s.servo for s in every]} == servos
+    periods = [s.path.period for s in every if s.path.period is not None]
+    assert (max(periods), min(periods)) == (2.0, 0.2)  # 0.5 Hz and 5 Hz
+    assert len({type(s.path) for s in every}) >= 8
+    assert len({type(s.force) for s in every}) >= 3
+
+
+def test_whole_suite_is_short() -> None:
+    assert sum(s.steps for s in SCENARIOS.values()) <= 70_000
+    assert max(s.duration for s in SCENARIOS.values()) <= 4.5
+
+
+# law
+
+
+def tight(limit: Limit) -> bool:
+    """Return whether a limit holds, and breaks where its metric is 10 % beyond the value."""
+    if limit.value is None:
+        return False
+    room = 0.1 * abs(limit.value)
+    below = limit.low == -math.inf or limit.value - room <= limit.low <= limit.value
+    return below and limit.value <= limit.high <= limit.value + room
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_ten_percent_worse_breaks_every_limit(name: str) -> None:
+    limits = results()[name].limits
+    assert [limit for limit in limits if not tight(limit)] == []
+    assert set(ERRORS) <= {limit.key for limit in limits}
+    for limit in limits:
+        both = "share" in limit.key or "torque_rms" in limit.key
+        assert not (both and limit.low == -math.inf), limit.key
+
+
+def test_what_is_loose_is_seen() -> None:
+    assert tight(Limit("tracking.rms", -math.inf, 1.1, 1.0, ok=True))
+    assert not tight(Limit("tracking.rms", -math.inf, 1.11, 1.0, ok=True))
+    assert not tight(Limit("tracking.rms", -math.inf, 0.99, 1.0, ok=False))
+    assert tight(Limit("load.share_A", 0.46, 0.54, 0.5, ok=True))
+    assert not tight(Limit("load.share_A", 0.44, 0.54, 0.5, ok=True))
+    assert tight(Limit("warnings", -math.inf, 0.0, 0.0, ok=True))
+    assert not tight(Limit("warnings", -math.inf, 1.0, 0.0, ok=True))
+
+
+# oracle: a disturbance of which nothing is told must be seen
+
+
+def unseen(plans: dict[str, Plan]) -> set[str]:
+    """Return which disturbances stay green."""
+    return {what for what, seen in zip(plans, turn_red([*plans.values()]), strict=True) if not seen}
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_each_scenario_sees_a_model_that_is_not_its_own(name: str) -> None:
+    assert unseen(disturbed.in_the_model(planned(name))) == UNSEEN.get(name, set())
+
+
+QUICK = [n for n in NAMES if isinstance(SCENARIOS[n].controller, control.Setpoints)]
+SLOW = [pytest.param(n, marks=pytest.mark.long) for n in NAMES if n not in QUICK]
+
+
+@pytest.mark.parametrize("name", [*QUICK, *SLOW])
+def test_each_scenario_sees_commands_that_come_a_step_late(name: str) -> None:
+    assert turn_red([disturbed.in_time(planned(name))]) == [name not in UNTIMED]
+
+
+@pytest.mark.parametrize("name", [*QUICK, *SLOW])
+def test_each_scenario_sees_another_leg(name: str) -> None:
+    assert unseen(disturbed.in_length(planned(name))) == UNSEEN_LENGTHS.get(name, set())
+
+
+@pytest.mark.parametrize("name", SLOW)
+def test_each_controller_sees_other_gains(name: str) -> None:
+    """10 % more or 10 % less of each is red; the servos' gains are those of the model above."""
+    more, less = (unseen(disturbed.in_gain(planned(name), factor)) for factor in (1.1, 0.9))
+    assert more & less == UNSEEN_GAINS.get(name, set())

@@ -1,0 +1,140 @@
+"""The same bits again: alone and together, by mj_step, in another process; and what says so."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import runpy
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from fivebar_sim import resources, rollout, simulate
+from fivebar_sim.rollout import Plan, Result
+from fivebar_sim.scenario import Scenario
+
+NAMES = sorted(resources.shipped("scenarios"))
+SCRIPTS = Path(__file__).parents[1] / "scripts"
+WORKER = SCRIPTS / "determinism_runs.py"
+
+
+def shortest(name: str) -> Plan:
+    """Return the plan of the shortest run of a scenario that is measured at all."""
+    path = Scenario.load(name).path
+    return rollout.plan(Scenario.load(name, [f"duration={path.ramp + (path.period or 0.3)}"]))
+
+
+@pytest.fixture(scope="module")
+def alone() -> list[Result]:
+    """Every scenario by itself, in the order of their names."""
+    return [rollout.execute(shortest(name)) for name in NAMES]
+
+
+def same_bits(result: Result, other: Result) -> None:
+    assert result.scenario == other.scenario
+    assert result.record.keys() == other.record.keys()
+    for key, column in result.record.items():
+        np.testing.assert_array_equal(column, other.record[key], err_msg=key)
+
+
+def test_two_of_each_together_on_two_threads(alone: list[Result]) -> None:
+    plans = [each for name in reversed(NAMES) for each in (shortest(name), shortest(name))]
+    together = rollout.run_all(plans, nthread=2)
+    for i, result in enumerate(reversed(alone)):
+        same_bits(together[2 * i], result)
+        same_bits(together[2 * i + 1], result)
+
+
+def test_by_plain_steps(alone: list[Result], monkeypatch: pytest.MonkeyPatch) -> None:
+    """One mj_step after the other, as whoever has no `mujoco.batch` would write it."""
+    monkeypatch.setattr(simulate, "Batch", runpy.run_path(str(WORKER))["Plain"])
+    for result in alone:
+        same_bits(rollout.run(result.scenario), result)
+
+
+@pytest.mark.long
+def test_other_processes() -> None:
+    def run(seed: str, *options: str) -> Any:
+        command = [sys.executable, str(WORKER), *options]
+        known = {**os.environ, "PYTHONHASHSEED": seed}
+        done = subprocess.run(command, env=known, capture_output=True, check=True)
+        return json.loads(done.stdout)
+
+    first = run("0")
+    assert sorted(first) == NAMES
+    assert len({each["bits"] for each in first.values()}) == len(NAMES)
+    assert run("1") == first
+    assert run("2", "--plain") == first
+
+
+# what scripts/determinism.py makes of it
+
+
+def runs(value: float | None, bits: str = "") -> dict[str, Any]:
+    metrics = {"tracking.rms": (value, 1e-6), "load.saturated.A": (0.0, 0.0)}
+    return {"one": {"metrics": {k: (0.0, 1.0) for k in metrics}, "bits": ""},
+            "two": {"metrics": metrics, "bits": bits}}  # fmt: skip
+
+
+def test_what_moves_most_is_named() -> None:
+    script = runpy.run_path(str(SCRIPTS / "determinism.py"))
+    (moved, still) = script["compared"](runs(1e-3), runs(1.0005e-3))
+    assert (moved.key, moved.scenario, still.part) == ("tracking.rms", "two", 0.0)
+    assert moved.part == pytest.approx(0.5)
+    assert script["compared"](runs(1e-3), runs(None))[0].part == math.inf
+
+
+@pytest.mark.parametrize(("there", "status"), [(1.0005e-3, 0), (1.002e-3, 1), (None, 1)])
+def test_beyond_the_tolerance_is_status_1(
+    capsys: pytest.CaptureFixture[str], there: float | None, status: int
+) -> None:
+    main = runpy.run_path(str(SCRIPTS / "determinism.py"))["main"]
+    main.__globals__["measured"] = lambda _, plain: runs(there, "x") if plain else runs(1e-3)
+    assert main([]) == status
+    said = capsys.readouterr().out
+    assert "plain mj_step, here: 1 of 2 scenarios have the same bits" in said
+    assert ("beyond the tolerance: two (tracking.rms)" in said) == bool(status)
+
+
+def test_version_that_does_not_exist_is_one_line() -> None:
+    script = runpy.run_path(str(SCRIPTS / "determinism.py"))
+    with pytest.raises(script["UnusableError"], match=r"^no such thing: "):
+        script["call"]("no such thing", sys.executable, "-c", "raise SystemExit('why')")
+
+
+# limits set anew
+
+FILE = """[path]
+closure.max = 9.0 # of no limits table
+
+[limits]
+tracking.rms = 2e-3              # [m], loose
+closure.max = 1.05e-6            # [m], tight
+load.share_A = [0.1, 0.9]
+load.saturated.A = 0.5
+"""
+
+
+def test_only_loose_limits_are_set_anew(capsys: pytest.CaptureFixture[str]) -> None:
+    script = runpy.run_path(str(SCRIPTS / "limits.py"))
+    low = -math.inf
+    limits = [
+        rollout.Limit("tracking.rms", low, 2e-3, 1e-3, ok=True),
+        rollout.Limit("closure.max", low, 1.05e-6, 1e-6, ok=True),
+        rollout.Limit("load.share_A", 0.1, 0.9, 0.5, ok=True),
+        rollout.Limit("load.saturated.A", low, 0.5, 0.0, ok=True),
+    ]
+    changed = script["rewritten"](FILE, limits).splitlines()
+    assert changed[:4] == FILE.splitlines()[:4]
+    assert changed[4:] == [
+        "tracking.rms = 1.05e-3              # [m], loose",
+        "closure.max = 1.05e-6            # [m], tight",
+        "load.share_A = [0.475, 0.525]",
+        "load.saturated.A = 0",
+    ]
+    assert "tracking.rms: 2e-3 -> 1.05e-3" in capsys.readouterr().out
