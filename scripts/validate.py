@@ -184,10 +184,7 @@ def at_rest() -> None:
         rows,
     )
     gaps = {integrator: stance.gaps(integrator) for integrator in air.INTEGRATORS}
-    rows = [
-        [name, *(um(gaps[i][name]) for i in air.INTEGRATORS)]
-        for name in gaps["discrete"]
-    ]
+    rows = [[name, *(um(gaps[i][name]) for i in air.INTEGRATORS)] for name in gaps["discrete"]]
     show(
         "f. largest loop gap of classic at 1 ms [um]",
         "run | discrete | implicitfast",

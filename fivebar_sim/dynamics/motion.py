@@ -112,8 +112,8 @@ def integrate(
 
     Args:
         leg: The leg.
-        theta: (theta_A, theta_E) at times[0] [rad], (2,).
-        theta_dot: At times[0] [rad/s], (2,).
+        theta: (theta_A, theta_E) at the first time [rad], (2,).
+        theta_dot: At the first time [rad/s], (2,).
         times: Where the motion is wanted, rising [s], (N,); between two steps of the integrator it
             is interpolated at order 7.
         torque: Of the motors, smooth in all arguments; None: they are free.
