@@ -177,6 +177,12 @@ def test_rolling_ball_does_not_slide() -> None:
     np.testing.assert_allclose(ground.slid(LEG, spins).sum(), r * 1.5)
 
 
+def test_contact_is_below_the_centre_by_the_radius_less_half_of_what_sinks_in() -> None:
+    heights = np.array([-2e-3, -0.0, 1e-3, 0.5, 2.0])
+    wanted = LEG.foot_radius - np.array([1e-3, 0.0, 0.0, 0.0, 0.0])
+    np.testing.assert_array_equal(ground.contact_radius(LEG, heights), wanted)
+
+
 def test_height_is_of_the_balls_lowest_point() -> None:
     q = kinematics.home(LEG)
     foot = kinematics.chain_points(LEG, q).F

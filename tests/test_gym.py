@@ -10,7 +10,7 @@ from typing import Any
 import gymnasium
 import numpy as np
 import pytest
-from env_runs import actions, played, scenario, task_of
+from env_runs import SHORT, actions, played, scenario, task_of
 from gymnasium.utils.env_checker import check_env
 
 import fivebar_sim.gym
@@ -105,7 +105,7 @@ def test_states_are_the_scenarios(kind: str, settings: tuple[str, ...]) -> None:
     if isinstance(ground, Treadmill):  # whose rail ends where the task says
         wanted = Scenario.load(
             "treadmill-trot",
-            ["duration=0.5", "path.frequency=4.0", *settings, f"scene.stop={ground.stop}"],
+            [*SHORT, *settings, f"scene.stop={ground.stop}"],
         )
     table = actions(task)
     theirs = played(wanted, table)

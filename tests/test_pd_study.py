@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -133,46 +132,6 @@ def test_study_agrees_with_the_equations_of_motion(ran: dict[str, Result]) -> No
     simulated = np.stack([result.record[f"foot_{axis}"][9:2000:10] for axis in "xz"], axis=-1)
     off = np.hypot(*(np.concatenate(feet) - simulated).T)
     assert off.max() < 0.4e-3  # half a timestep, which the torque is held for, at up to 0.8 m/s
-
-
-# the page
-
-
-def test_pages_first_table_is_what_comes_out() -> None:
-    table = PAGE.read_text("utf-8").split("## What they do")[1].split("\n\n")[2]
-    rows = [line.split("|")[1:4] for line in table.splitlines()[2:]]
-    cells = [(re.findall("`([^`]+)`", row[0]), row[1].split()) for row in rows]
-    short = [(words, value) for words, value in cells if "duration=40.0" not in words]
-    assert len(short) == 7
-    plans = [rollout.plan(Scenario.load("classic-ellipse", [SHORT, *s])) for s, _ in short]
-    for result, (words, (value, unit)) in zip(
-        rollout.run_all(plans, nthread=0), short, strict=True
-    ):
-        size = {"mm": 1e-3, "um": 1e-6}[unit]
-        assert rms(result) == pytest.approx(float(value) * size, rel=1e-2), words
-
-
-def test_pages_own_controller_runs_as_printed(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    page = PAGE.read_text("utf-8")
-    code, entry = re.findall(r"```(?:python|toml)\n(.*?)```", page, re.DOTALL)
-    info = tmp_path / "mine-1.0.dist-info"
-    info.mkdir()
-    (tmp_path / "mine.py").write_text(code, "utf-8")
-    (info / "METADATA").write_text("Name: mine\nVersion: 1.0\n", "utf-8")
-    text = entry.replace("[project.entry-points.", "[").replace('"', "")
-    (info / "entry_points.txt").write_text(text, "utf-8")
-    monkeypatch.setattr(sys, "modules", dict(sys.modules))  # forgets what is imported meanwhile
-    monkeypatch.syspath_prepend(tmp_path)
-    soft, stiff = (
-        rollout.run(Scenario.load("classic-ellipse", [SHORT, "controller.name=foot_spring", k]))
-        for k in ("controller.stiffness=200", "controller.stiffness=800")
-    )
-    said = re.search(r"follows at ([0-9.]+) mm RMS", page)
-    assert said is not None
-    assert rms(soft) == pytest.approx(1e-3 * float(said[1]), rel=1e-2)
-    assert rms(stiff) < 0.5 * rms(soft)
 
 
 # refusal

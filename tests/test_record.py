@@ -144,7 +144,7 @@ def test_load_in_stance_without_a_ground_is_that_of_the_plan() -> None:
 
 
 def test_phases_are_those_of_the_steps_begin() -> None:
-    """The histogram over a period is that of `load.measure` where the path is at each step's start."""
+    """The histogram over a period is `load.measure`'s of where the path is as each step begins."""
     plan, result = done("air")
     window = plan.scenario.window
     theta = np.concatenate([plan.motion.q[:1, [0, 2]], pair(result, "theta")])

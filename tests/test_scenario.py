@@ -285,7 +285,9 @@ def test_path_that_ends_before_the_run_is_refused(tmp_path: Path) -> None:
         "duration must be at most the path's 0.65 s, got 1 s"
     )
     # nine steps of 0.07 s, as the duration is rounded to, are longer than the path
-    assert refused(tmp_path, *csv, "path.ramp=0", "sim.timestep=0.07").startswith("duration must be at most")
+    assert refused(tmp_path, *csv, "path.ramp=0", "sim.timestep=0.07").startswith(
+        "duration must be at most"
+    )
 
 
 def test_unknown_source_is_refused(tmp_path: Path) -> None:

@@ -129,7 +129,7 @@ def states(**changes: np.ndarray) -> States:
         ctrl=np.zeros((1, 10, 2)),
         ground=np.zeros((1, 10, 0)),
         constraint=np.zeros((1, 10, 4)),
-        iterations=np.ones((1, 10), dtype=np.int32),
+        iterations=np.ones((1, 10)),
         warnings=np.zeros(1, dtype=int),
     )
     simulate.check(good, 1e-3)
