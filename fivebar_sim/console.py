@@ -49,8 +49,12 @@ SHOWN = {
     "ground.foot_height_max": ("foot height max", 1e3, "mm"),
     "ground.flight_max": ("longest flight", 1e3, "ms"),
     "energy.motor": ("work of the motors", 1e3, "mJ"),
+    "energy.force": ("work of the pushes", 1e3, "mJ"),
     "energy.ground": ("work of the ground", 1e3, "mJ"),
     "energy.constraints": ("work of loop, gears, ends", 1e3, "mJ"),
+    "energy.step": ("given by the steps", 1e3, "mJ"),
+    "energy.kinetic": ("kinetic energy gained", 1e3, "mJ"),
+    "energy.potential": ("potential energy gained", 1e3, "mJ"),
     "energy.turnover": ("energy turned over", 1e3, "mJ"),
     "energy.imbalance": ("energy imbalance", 1e2, "%"),
     "branch.flips": ("branch flips", 1.0, ""),
@@ -60,7 +64,8 @@ SHOWN = {
 
 DETAILS = (
     *("load.work", "load.opposing", "load.peak_ratio", "load.rms_ratio", "load.saturated"),
-    *("energy.motor", "energy.ground", "energy.constraints", "energy.turnover"),
+    *("energy.motor", "energy.force", "energy.ground", "energy.constraints", "energy.step"),
+    *("energy.kinetic", "energy.potential", "energy.turnover"),
 )
 """Metrics that are shown only where they have a limit, or where motors saturate."""
 
@@ -109,7 +114,7 @@ def print_result(result: Result, where: str, console: Console) -> None:
         judged = (bounds(limit), verdict(limit.ok)) if limit else ("", "")
         table.add_row(label, shown(key, look_up(result.metrics, key)), *judged)
     console.print(table)
-    for said in guards.broken(result.metrics["guards"]):
+    for said in guards.tripped(result.metrics["guards"]):
         console.print(f"[red]{said}[/red]", soft_wrap=True)
     console.print(
         f"verdict: {verdict(result.verdict == 'pass')}   written to {escape(where)}", soft_wrap=True

@@ -1,11 +1,14 @@
 """Where the energy of a run came from and where it went, and what is left unaccounted for.
 
-A step of MuJoCo takes the joint rates v at the pose q to v' by M(q) (v' - v) = h f, f the joint
-torques of all that acts, and then moves on with v'. So what acts does the work h f . (v + v') / 2
-in the step: exactly what the kinetic energy gains at that pose. And rates belong to the middle of
-the step that they moved the leg by, as in leapfrog: energies are those of v at q - h v / 2.
-What is left is of second order in the steps' turns; of classic-ellipse 0.02 %, of a landing 0.005 %
-of what is turned over. A balance that is worse tells of torques that are not those that acted.
+A step of MuJoCo takes the joint rates v at the pose q to v' by M(q) (v' - v) = h (f - c(q, v)), f
+the joint torques of all that acts and c the centripetal ones, and then moves on with v'. With
+w = (v + v') / 2, what acts does the work h f . w in the step, and what the kinetic energy gains at
+that pose is all of it if c were that of w: what a step gives away by taking c at its start,
+-h (c(q, v) - c(q, w)) . w, is counted as a work of its own. And rates belong to the middle of the
+step that they moved the leg by, as in leapfrog: energies are those of v at q - h v / 2.
+
+So what is left is some parts in a million of what is turned over. A balance that is worse tells of
+torques, masses or constraints that are not those that acted.
 """
 
 from __future__ import annotations
@@ -43,7 +46,7 @@ class Body(NamedTuple):
 
 
 class Steps(NamedTuple):
-    """What acted on a run besides motors and ground, and where it began, at rest.
+    """What acted on a run besides the motors, and where it began, at rest.
 
     Attributes:
         start: qpos at t = 0, the hip's height first where it slides, (nq,).
@@ -57,14 +60,16 @@ class Steps(NamedTuple):
     force: Array
 
 
-class Works(NamedTuple):
-    """The work of a step on the leg and what it carries [J], each (N,).
+class Balance(NamedTuple):
+    """The works of each step on the leg and what it carries, and what they gained [J], each (N,).
 
     Attributes:
         motor: Of A and E, their damping included.
         force: Of the pushes on the foot.
         ground: Of floor or belt.
-        constraints: Of the loop at C, gear friction and ends of travel; negative is lost.
+        constraints: What all constraints did but for the ground: the loop at C, gear friction, ends
+            of travel; negative is lost.
+        step: What MuJoCo's step gave by taking centripetal torques at its start.
         kinetic: What the kinetic energy gained.
         potential: What the potential energy gained.
     """
@@ -73,18 +78,27 @@ class Works(NamedTuple):
     force: Array
     ground: Array
     constraints: Array
+    step: Array
     kinetic: Array
     potential: Array
 
     @property
     def turnover(self) -> float:
-        """The work of all steps with either sign, added up [J]."""
-        return float(np.sum(np.abs(self[:4])))
+        """Works of motors, pushes, ground, constraints, gravity, with either sign, added up [J]."""
+        acting = (self.motor, self.force, self.ground, self.constraints, self.potential)
+        return float(np.sum(np.abs(acting)))
 
     @property
     def unaccounted(self) -> Array:
         """Energy so far that no work accounts for [J], (N,)."""
-        return np.cumsum(self.kinetic + self.potential - np.sum(self[:4], axis=0))
+        given = self.motor + self.force + self.ground + self.constraints + self.step
+        return np.cumsum(self.kinetic + self.potential - given)
+
+    @property
+    def given(self) -> Array:
+        """What constraints gave since they had given least [J], (N,); they can only take."""
+        so_far = np.cumsum(self.constraints)
+        return so_far - np.minimum.accumulate(np.minimum(so_far, 0.0))
 
     @property
     def imbalance(self) -> float | None:
@@ -94,44 +108,85 @@ class Works(NamedTuple):
         return float(np.abs(self.unaccounted).max()) / self.turnover
 
 
-def works(body: Body, record: Mapping[str, Array], steps: Steps) -> Works:
-    """Return the work of every step.
+class _Motion(NamedTuple):
+    """The motion at t = 0 and after each step, (N + 1, ...), and the mean rates of steps, (N, ...).
+
+    Attributes:
+        q: Joint angles as in `mechanical` [rad], (N + 1, 4).
+        v: Their rates [rad/s], (N + 1, 4).
+        hip: Height of the hip frame [m], (N + 1,).
+        hip_dot: Its rate [m/s], (N + 1,).
+        w: Mean joint rates of each step [rad/s], (N, 4).
+        lift: Mean rate of the hip [m/s], (N,).
+    """
+
+    q: Array
+    v: Array
+    hip: Array
+    hip_dot: Array
+    w: Array
+    lift: Array
+
+    @classmethod
+    def of(cls, record: Mapping[str, Array], start: Array) -> _Motion:
+        """Return the motion of a record that began at rest."""
+        q = np.stack([record[f"theta_{joint}"] for joint in JOINTS], axis=-1)
+        v = np.stack([record[f"theta_dot_{joint}"] for joint in JOINTS], axis=-1)
+        q, v = _begun(start[-4:], q), _begun(np.zeros(4), v)
+        hip, hip_dot = np.zeros((2, len(q)))
+        if "hip_z" in record:
+            hip, hip_dot = _begun(start[0], record["hip_z"]), _begun(0.0, record["hip_dot_z"])
+        return cls(q, v, hip, hip_dot, 0.5 * (v[1:] + v[:-1]), 0.5 * (hip_dot[1:] + hip_dot[:-1]))
+
+
+def balance(body: Body, record: Mapping[str, Array], steps: Steps) -> Balance:
+    """Return the works of every step, and what the energies gained.
 
     Args:
         body: What moves.
         record: The columns of rollout.parquet.
-        steps: What acted besides.
+        steps: What acted besides the motors.
     """
-    leg, h = body.leg, float(record["time"][0])
-    q = np.stack([record[f"theta_{joint}"] for joint in JOINTS], axis=-1)
-    v = np.stack([record[f"theta_dot_{joint}"] for joint in JOINTS], axis=-1)
-    q, v = _begun(steps.start[-4:], q), _begun(np.zeros(4), v)
-    hip, hip_dot = np.zeros((2, len(q)))
-    if "hip_z" in record:
-        hip = _begun(steps.start[0], record["hip_z"])
-        hip_dot = _begun(0.0, record["hip_dot_z"])
-    kinetic, potential = mechanical(body, q - 0.5 * h * v, v, hip - 0.5 * h * hip_dot, hip_dot)
-
-    w, lift = 0.5 * (v[1:] + v[:-1]), 0.5 * (hip_dot[1:] + hip_dot[:-1])
+    leg, h, m = body.leg, float(record["time"][0]), _Motion.of(record, steps.start)
+    kinetic, potential = mechanical(
+        body, m.q - 0.5 * h * m.v, m.v, m.hip - 0.5 * h * m.hip_dot, m.hip_dot
+    )
     torque = np.stack([record["torque_A"], record["torque_E"]], axis=-1)
-    moved = foot_rates(leg, q[:-1], w)
-    force = h * np.sum(steps.force * moved, axis=-1) if steps.force.size else np.zeros(len(w))
-    ground = np.zeros(len(w))
+    foot = foot_rates(leg, m.q[:-1], m.w)
+    none = np.zeros(len(m.w))
+    ground = none
     if "ground_z" in record:
-        height = hip[:-1] + kinematics.chain_points(leg, q[:-1]).F[:, 1] - leg.foot_radius
-        rolled = contact_radius(leg, height) * (w[:, 0] + w[:, 1])
-        ground = h * (
-            record["ground_x"] * (moved[:, 0] + rolled) + record["ground_z"] * (moved[:, 1] + lift)
-        )
-    joints = np.column_stack([lift, w]) if "hip_z" in record else w
-    return Works(
-        motor=h * np.sum(torque * w[:, [0, 2]], axis=-1),
-        force=force,
+        height = m.hip[:-1] + kinematics.chain_points(leg, m.q[:-1]).F[:, 1] - leg.foot_radius
+        rolled = contact_radius(leg, height) * (m.w[:, 0] + m.w[:, 1])
+        x, z = foot[:, 0] + rolled, foot[:, 1] + m.lift  # of the point of contact
+        ground = h * (record["ground_x"] * x + record["ground_z"] * z)
+    joints = np.column_stack([m.lift, m.w]) if "hip_z" in record else m.w
+    return Balance(
+        motor=h * np.sum(torque * m.w[:, [0, 2]], axis=-1),
+        force=h * np.sum(steps.force * foot, axis=-1) if steps.force.size else none,
         ground=ground,
         constraints=h * np.sum(steps.constraint * joints, axis=-1) - ground,
+        step=h * _given_away(body, m),
         kinetic=np.diff(kinetic),
         potential=np.diff(potential),
     )
+
+
+def _given_away(body: Body, m: _Motion) -> Array:
+    """Return -(c(q, v) - c(q, w)) . w of every step [W], v the rates at its start, (N,).
+
+    c is that of the links' own directions, and of the hip, which a link's moment r about its joint
+    pushes down by r_z psi_dot^2.
+    """
+    chain = Chain.of(body.leg, None, body.payload)
+    p = _open_pose(m.q[:-1])
+    v, w, still = _of_links(m.v[:-1]), _of_links(m.w), (0.0, 0.0, 0.0, 0.0)
+    at_start, meant = chain.link_torques(p, v, still), chain.link_torques(p, w, still)
+    links = sum((c - d) * rate for c, d, rate in zip(at_start, meant, w, strict=True))
+    hip = sum(
+        r[1] * (a * a - b * b) for r, a, b in zip(chain.moments(p), v, w, strict=True)
+    )  # fmt: skip
+    return np.asarray(hip * m.lift - links)
 
 
 def mechanical(
@@ -149,9 +204,7 @@ def mechanical(
         hip_dot: Its rate [m/s], (...).
     """
     chain = Chain.of(body.leg, None, body.payload)
-    psi = _of_links(q)
-    p = Pose(*((np.cos(angle), np.sin(angle)) for angle in psi))
-    w = _of_links(v)
+    p, w = _open_pose(q), _of_links(v)
     kinetic, potential = chain.energies(p, w)
     mass = body.trunk + body.payload + sum(link.mass for link in body.leg.links)
     momentum = sum(r[0] * rate for r, rate in zip(chain.moments(p), w, strict=True))
@@ -178,17 +231,21 @@ def foot_rates(leg: FiveBar, q: Array, v: Array) -> Array:
     return np.stack([-AB[1] * w1 - BF[1] * w2, AB[0] * w1 + BF[0] * w2], axis=-1)
 
 
-def measure(works: Works) -> dict[str, Any]:
+def measure(found: Balance) -> dict[str, Any]:
     """Return the metrics of the energy, over the whole run.
 
-    motor, force, ground and constraints are the net works [J], kinetic and potential what was
-    gained; turnover and imbalance those of `Works`.
+    The net works and gains of `Balance` [J], and its turnover and imbalance.
     """
     return {
-        **{name: float(work.sum()) for name, work in works._asdict().items()},
-        "turnover": works.turnover,
-        "imbalance": works.imbalance,
+        **{name: float(work.sum()) for name, work in found._asdict().items()},
+        "turnover": found.turnover,
+        "imbalance": found.imbalance,
     }
+
+
+def _open_pose(q: Array) -> Pose:
+    """Return the directions of the links at joint angles as in `mechanical`."""
+    return Pose(*((np.cos(psi), np.sin(psi)) for psi in _of_links(q)))
 
 
 def _of_links(q: Array) -> tuple[Array, Array, Array, Array]:

@@ -1,4 +1,4 @@
-"""What makes a run no evidence, whatever its limits say.
+"""Guards: what makes a run no evidence, whatever its limits say, trips one.
 
 Physics that does not hold, torque that is not there, a leg that has become another one.
 
@@ -17,11 +17,11 @@ import numpy as np
 from fivebar_sim import ground
 from fivebar_sim.arrays import Array, Bools
 from fivebar_sim.checks import check_number
-from fivebar_sim.energy import Works
+from fivebar_sim.energy import Balance
 from fivebar_sim.geometry import FiveBar
 
 WITHIN = 1.0
-"""The time [s] within which clipped torque is added up."""
+"""The time [s] within which clipped torque is added up; of a shorter run, all of it."""
 
 
 class Guards(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -30,20 +30,26 @@ class Guards(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     Attributes:
         loop: Greatest gap of the loop at C, in parts of the leg's size.
         ground: Deepest that the foot may sink into the floor, in parts of its ball's diameter.
-        torque: Longest that a motor's torque may be clipped within any second [s].
+        torque: Greatest part of any second, or of a shorter run, in which a motor's torque may be
+            clipped; 1 is all of it.
         energy: Greatest imbalance of the energy, in parts of what was turned over.
+        constraints: Most that loop, gear friction and ends of travel may give, in the same parts.
+        step: Most that MuJoCo's steps may give or take by themselves, in the same parts.
     """
 
     loop: float = 0.01
     ground: float = 1.0
     torque: float = 0.5
-    energy: float = 0.01
+    energy: float = 1e-3
+    constraints: float = 0.01
+    step: float = 0.02
 
     def __post_init__(self) -> None:
         check_number("loop", self.loop, "", low=0.0)
         check_number("ground", self.ground, "", low=0.0)
-        check_number("torque", self.torque, "s", low=0.0)
-        check_number("energy", self.energy, "", low=0.0)
+        check_number("torque", self.torque, "", low=0.0, high=1.0)
+        for part in ("energy", "constraints", "step"):
+            check_number(part, getattr(self, part), "", low=0.0)
 
 
 class Guard(NamedTuple):
@@ -53,7 +59,7 @@ class Guard(NamedTuple):
         name: What it looks at.
         value: What was found, in SI units; None where there is nothing to find.
         high: Greatest value that is fine.
-        time: When it was first passed [s]; None if it never was.
+        time: When it tripped, the first step above `high` [s]; None if it never did.
     """
 
     name: str
@@ -67,10 +73,11 @@ class Guard(NamedTuple):
         return self.time is None
 
     def __str__(self) -> str:
-        """Return what it says where it was passed: the bound, when, and the worst of the run."""
+        """Return what it says where it tripped: the bound, when, and the worst of the run."""
         what, worst, scale = SAID[self.name]
         high, value = scale * self.high, scale * (self.value or 0.0)
-        return f"{what.format(high)} at t = {self.time:g} s{worst.format(value)}"
+        said = f"{what.format(high)} at t = {self.time:g} s{worst.format(value)}"
+        return f"guard {self.name}: {said}"
 
 
 SAID = {
@@ -78,19 +85,29 @@ SAID = {
     "loop": ("the loop was open by more than {:.3g} mm", ", by {:.3g} mm at worst", 1e3),
     "ground": ("the foot was in the floor by more than {:.3g} mm", ", by {:.3g} mm at worst", 1e3),
     "torque": (
-        "a motor's torque had been clipped for more than {:.3g} s of a second",
-        ", for {:.3g} s at worst",
-        1.0,
+        "a motor's torque had been clipped for more than {:.3g} % of a second",
+        ", for {:.3g} % at worst",
+        1e2,
     ),
     "energy": (
         "more than {:.3g} % of the energy turned over was unaccounted for",
         ", {:.3g} % at worst",
         1e2,
     ),
+    "constraints": (
+        "loop, gears or ends of travel had given more than {:.3g} % of the energy turned over",
+        ", {:.3g} % at worst",
+        1e2,
+    ),
+    "step": (
+        "the steps by themselves had given or taken more than {:.3g} % of the energy turned over",
+        ", {:.3g} % at worst",
+        1e2,
+    ),
     "solver": ("MuJoCo's solver did not converge", ", nor in {:.0f} steps in all", 1.0),
 }
-"""What a passed guard says: with its bound before the time and the worst value after it, both times
-a factor from SI."""
+"""What a tripped guard says, with its bound before the time and the worst value after it, and the
+factor from SI of both."""
 
 
 def judge(
@@ -100,7 +117,7 @@ def judge(
     *,
     branch: Mapping[str, Any],
     saturated: Bools,
-    works: Works,
+    balance: Balance,
     unsolved: Bools,
 ) -> list[Guard]:
     """Return every guard of a run, over all of its steps.
@@ -111,7 +128,7 @@ def judge(
         record: The columns of rollout.parquet.
         branch: The metrics of that name.
         saturated: Whether the torque limit clipped A and E in each step, (N, 2).
-        works: The work of each step.
+        balance: The work of each step.
         unsolved: Whether the constraint solver ran out of iterations in each step, (N,).
     """
     time = record["time"]
@@ -119,7 +136,9 @@ def judge(
         Guard("branch", float(branch["flips"]), 0.0, branch["first_flip"]),
         _highest("loop", record["gap"], bounds.loop * leg.size, time),
         _highest("torque", _clipped(saturated, time), bounds.torque, time),
-        _energy(works, bounds.energy, time),
+        _part("energy", balance.unaccounted, bounds.energy, balance, time),
+        _part("constraints", balance.given, bounds.constraints, balance, time),
+        _part("step", np.cumsum(balance.step), bounds.step, balance, time),
         Guard("solver", float(unsolved.sum()), 0.0, _first(unsolved, time)),
     ]
     if "ground_z" in record:
@@ -128,8 +147,8 @@ def judge(
     return found
 
 
-def broken(guards: list[Mapping[str, Any]]) -> list[str]:
-    """Return what the guards that were passed say, from the metrics of that name."""
+def tripped(guards: list[Mapping[str, Any]]) -> list[str]:
+    """Return what the guards that tripped say, from the metrics of that name."""
     known = (Guard(**{key: each[key] for key in Guard._fields}) for each in guards)
     return [str(guard) for guard in known if not guard.ok]
 
@@ -143,17 +162,15 @@ def _first(chosen: Bools, time: Array) -> float | None:
 
 
 def _clipped(saturated: Bools, time: Array) -> Array:
-    """Return how long the worse motor was clipped in the last second, at each step [s], (N,)."""
-    h = float(time[0])
-    steps = max(1, round(WITHIN / h))
+    """Return in which part of the second before it the worse motor was clipped, (N,)."""
+    steps = min(max(1, round(WITHIN / float(time[0]))), len(time))
     so_far = np.concatenate([np.zeros((1, 2)), np.cumsum(saturated, axis=0)])
     begin = np.maximum(np.arange(1, len(time) + 1) - steps, 0)
-    return h * (so_far[1:] - so_far[begin]).max(axis=1)
+    return (so_far[1:] - so_far[begin]).max(axis=1) / steps
 
 
-def _energy(works: Works, high: float, time: Array) -> Guard:
-    off = np.abs(works.unaccounted)
-    imbalance = works.imbalance
-    if imbalance is None:
-        return Guard("energy", None, high, None)
-    return Guard("energy", imbalance, high, _first(off > high * works.turnover, time))
+def _part(name: str, energy: Array, high: float, balance: Balance, time: Array) -> Guard:
+    """Return the guard of an energy so far, in parts of what was turned over in the run."""
+    if balance.imbalance is None:
+        return Guard(name, None, high, None)
+    return _highest(name, np.abs(energy) / balance.turnover, high, time)

@@ -11,7 +11,7 @@ from typing import Any
 import msgspec
 import tomli_w
 
-from fivebar_sim import console, control, metrics, regression, rollout, tables
+from fivebar_sim import console, control, guards, metrics, regression, rollout, tables
 from fivebar_sim.checks import check_number
 from fivebar_sim.control import Feedback, Setpoints
 from fivebar_sim.errors import ArgumentError, ConfigError, FiveBarError, unknown
@@ -60,23 +60,23 @@ class LegRun:
         return self.result.verdict
 
     def assert_limits(self) -> None:
-        """Fail unless the verdict is "pass": all limits hold, and the leg kept its branch.
+        """Fail unless the verdict is "pass": all limits hold, and no guard tripped.
 
         Raises:
-            AssertionError: One line for every broken limit, and when the leg left its branch.
+            AssertionError: One line for every broken limit, and what the guards say that tripped.
             ConfigError: The scenario has no limits, so that nothing would be asserted.
         """
         __tracebackhide__ = True
-        if not self.limits:
-            raise ConfigError(f"{self.scenario.name} has no [limits]: there is nothing to assert")
         failures = regression.compare(self.result, None).failures
         if failures:
             raise AssertionError("\n  ".join([f"{self.scenario.name} fails:", *failures]))
+        if not self.limits:
+            raise ConfigError(f"{self.scenario.name} has no [limits]: there is nothing to assert")
 
     def assert_metric(
         self, key: str, *, low: float | None = None, high: float | None = None
     ) -> None:
-        """Fail unless low <= metric <= high, in SI units.
+        """Fail unless low <= metric <= high, in SI units, and no guard tripped.
 
         Args:
             key: The metric's dotted key, as in [limits]: "tracking.rms".
@@ -84,7 +84,7 @@ class LegRun:
             high: Greatest value that passes; None is none.
 
         Raises:
-            AssertionError: Names the metric with its value and bounds.
+            AssertionError: Names the metric with its value and bounds, or what a guard says.
             ArgumentError: No such metric in this run, no bound, or low > high.
         """
         __tracebackhide__ = True
@@ -97,6 +97,9 @@ class LegRun:
             check_number("low", low, "")
         if high is not None:
             check_number("high", high, "", low=-inf if low is None else low)
+        tripped = guards.tripped(self.metrics["guards"])
+        if tripped:
+            raise AssertionError("\n  ".join([f"{self.scenario.name} fails:", *tripped]))
         bounds = (-inf if low is None else low, inf if high is None else high)
         (judged,) = metrics.judge(self.metrics, {key: bounds})
         if not judged.ok:

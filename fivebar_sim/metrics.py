@@ -11,14 +11,13 @@ from fivebar_sim import energy, ground, guards, kinematics, load
 from fivebar_sim.arrays import Array, Bools
 from fivebar_sim.geometry import FiveBar
 from fivebar_sim.paths import Gait
-from fivebar_sim.scenes import Ground
 
 if TYPE_CHECKING:
     from fivebar_sim.scenario import Scenario
 
 Record = dict[str, Array]
 
-JOINT_COLUMNS = ("theta_A", "theta_B", "theta_E", "theta_D")
+JOINT_COLUMNS = tuple(f"theta_{joint}" for joint in energy.JOINTS)
 
 GROUND_KEYS = (
     "ground.force_max.x",
@@ -55,8 +54,12 @@ LIMIT_KEYS = (
     "load.saturated.E",
     *GROUND_KEYS,
     "energy.motor",
+    "energy.force",
     "energy.ground",
     "energy.constraints",
+    "energy.step",
+    "energy.kinetic",
+    "energy.potential",
     "energy.turnover",
     "energy.imbalance",
     "branch.flips",
@@ -104,10 +107,9 @@ def measure(scenario: Scenario, record: Mapping[str, Array], besides: Unrecorded
         record: The columns of rollout.parquet.
         besides: What its record does not say.
     """
-    leg, scene = scenario.leg, scenario.scene
-    start, saturated = besides.steps.start[-4::2], besides.saturated
-    trunk = scene.mass if isinstance(scene, Ground) else 0.0
-    works = energy.works(energy.Body(leg, scenario.payload, trunk), record, besides.steps)
+    leg, start, saturated = scenario.leg, besides.steps.start[-4::2], besides.saturated
+    body = energy.Body(leg, scenario.payload, scenario.trunk)
+    balance = energy.balance(body, record, besides.steps)
     branch = _branch(leg, record)
     guarded = guards.judge(
         scenario.guards,
@@ -115,7 +117,7 @@ def measure(scenario: Scenario, record: Mapping[str, Array], besides: Unrecorded
         record,
         branch=branch,
         saturated=saturated,
-        works=works,
+        balance=balance,
         unsolved=besides.unsolved,
     )
     window = scenario.window
@@ -124,7 +126,7 @@ def measure(scenario: Scenario, record: Mapping[str, Array], besides: Unrecorded
         "tracking": {"rms": _rms(error), "max": float(error.max())},
         "closure": {"rms": _rms(gap), "max": float(gap.max())},
         "load": _load(scenario, record, start, saturated),
-        "energy": energy.measure(works),
+        "energy": energy.measure(balance),
         "branch": branch,
         "guards": [{**guard._asdict(), "ok": guard.ok} for guard in guarded],
         "warnings": int(besides.warnings),

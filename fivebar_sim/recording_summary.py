@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
+from fivebar_sim import guards
 from fivebar_sim.console import SHOWN, bounds, shown
 from fivebar_sim.metrics import Limit, judge, look_up
 
@@ -14,7 +15,7 @@ def summary(
     metrics: Sequence[Mapping[str, Any]],
     limits: Sequence[Mapping[str, tuple[float, float]]],
 ) -> str:
-    """Return Markdown: of every run the verdict, and each limit with its value; then the metrics.
+    """Return Markdown: of every run verdict, tripped guards and limits; then the metrics.
 
     Args:
         labels: What each run is called.
@@ -24,6 +25,8 @@ def summary(
     lines: list[str] = []
     for label, measured, own in zip(labels, metrics, limits, strict=True):
         lines += [f"## {_cell(label)}: {measured['verdict'].upper()}", ""]
+        tripped = [f"- {said}" for said in guards.tripped(measured.get("guards", []))]
+        lines += [*tripped, ""] if tripped else []
         lines += [*_limits(_judged(measured, own)), ""]
     names = [_cell(label) for label in labels] if len(labels) > 1 else ["value"]
     lines += [f"| metric | {' | '.join(names)} |", f"|:--|{'--:|' * len(names)}"]

@@ -49,7 +49,7 @@ class Checked(NamedTuple):
     Attributes:
         name: The scenario's.
         rows: Its metrics that have a limit or a baseline.
-        broke: Why the run itself failed: it diverged, or passed a guard; "" if it did not.
+        broke: Why the run itself failed: it diverged, or a guard tripped; "" if it did not.
         notes: What should be known besides: no baseline, or one that was made otherwise.
     """
 
@@ -81,8 +81,9 @@ def compare(result: Result, baseline: Baseline | None) -> Checked:
         for key in SHOWN
         if key in limits or key in recorded
     ]
-    notes = list(_notes(baseline, metrics))
-    return Checked(result.scenario.name, rows, _broke(result), notes)
+    broke = _broke(result)
+    notes = [] if broke else list(_notes(baseline, metrics))
+    return Checked(result.scenario.name, rows, broke, notes)
 
 
 def accept(checked: Checked) -> Checked:
@@ -93,9 +94,7 @@ def accept(checked: Checked) -> Checked:
 
 def _broke(result: Result) -> str:
     """Return why a run failed, if not by its limits."""
-    passed = "; ".join(guards.broken(result.metrics["guards"]))
-    unexplained = result.verdict != "pass" and all(limit.ok for limit in result.limits)
-    return passed or ("the run's own verdict is fail" if unexplained else "")
+    return "; ".join(guards.tripped(result.metrics["guards"]))
 
 
 def _notes(baseline: Baseline | None, metrics: Mapping[str, Any]) -> Iterator[str]:

@@ -106,6 +106,11 @@ class Scenario(msgspec.Struct, frozen=True, kw_only=True):
         """The point mass that the foot carries [kg]."""
         return self.scene.mass if isinstance(self.scene, Payload) else 0.0
 
+    @property
+    def trunk(self) -> float:
+        """The mass that rides on the hip [kg]; 0 where the hip is fixed."""
+        return self.scene.mass if isinstance(self.scene, Ground) else 0.0
+
     @classmethod
     def load(cls, source: str | Path, settings: Iterable[str] = ()) -> Scenario:
         """Return the scenario of a shipped name or a TOML file.

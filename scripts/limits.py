@@ -11,9 +11,10 @@ from __future__ import annotations
 import math
 import re
 import sys
+import tomllib
 from pathlib import Path
 
-from fivebar_sim import resources, rollout
+from fivebar_sim import resources, rollout, tables
 from fivebar_sim.metrics import Limit
 from fivebar_sim.scenario import Scenario
 
@@ -61,6 +62,7 @@ def bounds(limit: Limit) -> str:
 
 def number(value: float) -> str:
     """Return three digits of a number, in thousandths or millionths where it is small."""
+    value = float(f"{value:.3g}")
     if value == 0.0 or abs(value) >= 0.1:
         return f"{value:.3g}"
     power = 3 * math.floor(math.log10(abs(value)) / 3)
@@ -73,8 +75,22 @@ def main(sources: list[str]) -> None:
     for source in sources or list(shipped):
         file = shipped.get(source, Path(source))
         print(file.stem)
-        text = file.read_text(encoding="utf-8")
-        file.write_text(rewritten(text, rollout.run(Scenario.load(file)).limits), encoding="utf-8")
+        limits = rollout.run(Scenario.load(file)).limits
+        loose = {limit.key for limit in limits if not is_tight(limit)}
+        text = rewritten(file.read_text(encoding="utf-8"), limits)
+        left = loose - changed(text, limits)
+        if left:
+            raise SystemExit(f"{file}: set by hand, one a line under [limits]: {sorted(left)}")
+        file.write_text(text, encoding="utf-8")
+
+
+def changed(text: str, limits: list[Limit]) -> set[str]:
+    """Return the keys whose limits a file has otherwise than they were judged."""
+    now = dict(tables.flat(tomllib.loads(text)["limits"]))
+    read = {
+        key: value if isinstance(value, list) else [-math.inf, value] for key, value in now.items()
+    }
+    return {limit.key for limit in limits if read.get(limit.key) != [limit.low, limit.high]}
 
 
 if __name__ == "__main__":

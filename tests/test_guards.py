@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
 import numpy as np
 import pytest
 from shell import Shell
 
-from fivebar_sim import guards, rollout
+from fivebar_sim import guards, resources, rollout
 from fivebar_sim.errors import ArgumentError, ConfigError
 from fivebar_sim.geometry import FiveBar
 from fivebar_sim.guards import Guard, Guards
@@ -27,7 +28,7 @@ def ran(name: str, *settings: str) -> Result:
     return rollout.run(Scenario.load(name, ["limits={}", *settings]))
 
 
-def passed(result: Result) -> dict[str, Guard]:
+def tripped(result: Result) -> dict[str, Guard]:
     fields = Guard._fields
     each = [Guard(**{key: row[key] for key in fields}) for row in result.metrics["guards"]]
     return {guard.name: guard for guard in each if not guard.ok}
@@ -40,28 +41,40 @@ def passed(result: Result) -> dict[str, Guard]:
     ("name", "settings", "guard", "said"),
     [
         (
-            "rail-landing",
+            "treadmill-trot",
             ("sim.integrator=implicitfast", "sim.timestep=0.002"),
             "loop",
-            "the loop was open by more than 1 mm at t = 0.1",
+            "guard loop: the loop was open by more than 1 mm at t = 0.03",
         ),
         (
             "rail-landing",
             ("scene.drop=1.0",),
             "ground",
-            "the foot was in the floor by more than 12 mm at t = 0.4",
+            "guard ground: the foot was in the floor by more than 12 mm at t = 0.4",
         ),
         (
             "airhockey-pd",
             CHATTER,
             "torque",
-            "a motor's torque had been clipped for more than 0.5 s of a second at t = 0.5",
+            "guard torque: a motor's torque had been clipped for more than 50 % of a second at",
+        ),
+        (
+            "rail-landing",
+            ("sim.integrator=implicitfast",),
+            "constraints",
+            "guard constraints: loop, gears or ends of travel had given more than 1 % of the",
+        ),
+        (
+            "minitaur-trot",
+            ("path.frequency=10", "path.ramp=0.1", "duration=0.4", "servo={kp=500,kd=1}"),
+            "step",
+            "guard step: the steps by themselves had given or taken more than 2 % of the energy",
         ),
         (
             "classic-ellipse",
-            ("guards.energy=1e-5", "duration=1"),
+            ("guards.energy=1e-7", "duration=1"),
             "energy",
-            "more than 0.001 % of the energy turned over was unaccounted for at t = 0.",
+            "guard energy: more than 1e-05 % of the energy turned over was unaccounted",
         ),
     ],
 )
@@ -70,14 +83,14 @@ def test_each_turns_the_verdict_and_says_when(
 ) -> None:
     result = ran(name, *settings)
     assert result.verdict == "fail"
-    assert list(passed(result)) == [guard]
-    assert str(passed(result)[guard]).startswith(said)
+    assert list(tripped(result)) == [guard]
+    assert str(tripped(result)[guard]).startswith(said)
     assert ran(name, *(s for s in settings if s[:2] in ("du", "pa"))).verdict == "pass"
 
 
 def test_time_is_that_of_the_first_step_past_the_bound() -> None:
     result = ran("rail-landing", "scene.drop=1.0", "duration=1.2")
-    guard = passed(result)["ground"]
+    guard = tripped(result)["ground"]
     record, leg = result.record, result.scenario.leg
     depth = leg.foot_radius - record["hip_z"] - record["foot_z"]
     assert guard.high == 2.0 * leg.foot_radius
@@ -89,13 +102,12 @@ def test_solver_that_ran_out_of_iterations(monkeypatch: pytest.MonkeyPatch) -> N
     plan = rollout.plan(Scenario.load("rail-landing", ["limits={}", "duration=1.2"]))
     plan.model.opt.iterations = 2
     result = rollout.execute(plan)
-    guard = passed(result)["solver"]
+    guard = tripped(result)["solver"]
     assert result.verdict == "fail"
     assert guard.time is not None
     assert 0.09 < guard.time < 0.12  # the landing
-    assert str(guard).startswith(
-        f"MuJoCo's solver did not converge at t = {guard.time:g} s, nor in"
-    )
+    words = f"MuJoCo's solver did not converge at t = {guard.time:g} s, nor in"
+    assert str(guard).startswith(f"guard solver: {words}")
 
 
 def test_clipped_time_is_of_the_worse_motor_within_a_second() -> None:
@@ -109,13 +121,34 @@ def test_clipped_time_is_of_the_worse_motor_within_a_second() -> None:
     assert time[so_far.argmax()] == pytest.approx(1.99)  # the fiftieth step
     assert so_far[79] == pytest.approx(0.3)
     assert so_far[-1] == 0.0
+    short = guards._clipped(saturated[50:80], time[:30])  # all of a run of 0.3 s
+    assert short[[0, 14, 29]] == pytest.approx([1 / 30, 0.5, 1.0])
 
 
 def test_bounds_are_in_parts_of_the_leg() -> None:
     long = ran("classic-ellipse", "duration=1", "guards.loop=0.02").metrics["guards"]
     (loop,) = (each for each in long if each["name"] == "loop")
     assert loop["high"] == pytest.approx(0.02 * FiveBar.load("classic").size)
-    assert {each["name"] for each in long} == {"branch", "loop", "torque", "energy", "solver"}
+    assert {each["name"] for each in long} == {
+        *("branch", "loop", "torque", "energy", "constraints", "step", "solver")
+    }
+
+
+def test_shipped_scenarios_stay_far_below() -> None:
+    """What docs/model.md says of them, in the bounds' own parts."""
+    plans = [rollout.plan(Scenario.load(name)) for name in resources.shipped("scenarios")]
+    most = dict.fromkeys(("loop", "ground", "torque", "energy", "constraints", "step"), 0.0)
+    for result in rollout.run_all(plans):
+        for guard in result.metrics["guards"]:
+            if guard["name"] in most:
+                bound = getattr(result.scenario.guards, guard["name"])
+                part = bound * guard["value"] / guard["high"]
+                most[guard["name"]] = max(most[guard["name"]], part)
+    page = (Path(__file__).parents[1] / "docs" / "model.md").read_text("utf-8")
+    for name, part in most.items():
+        bound, shipped = re.findall(rf"\| `{name}` \| .* \| (.*) \| (.*) \|", page)[0]
+        assert getattr(Guards(), name) == float(bound)
+        assert 0.5 * float(shipped) < part <= float(shipped)
 
 
 # the edge
@@ -129,13 +162,13 @@ def test_scenario_sets_and_keeps_them(tmp_path: Path) -> None:
         Scenario.load("classic-ellipse", ["guards.penetration=1"])
     with pytest.raises(ConfigError, match=r"guards\.loop must be in \[0, inf\), got -1"):
         Scenario.load("classic-ellipse", ["guards.loop=-1"])
-    with pytest.raises(ArgumentError, match=r"torque must be in \[0, inf\) s, got -1"):
-        Guards(torque=-1)
+    with pytest.raises(ArgumentError, match=r"torque must be in \[0, 1\], got 2"):
+        Guards(torque=2)
 
 
 def test_everyone_is_told(shell: Shell) -> None:
     chatter = [f"--set={setting}" for setting in ("limits={}", *CHATTER)]
-    words = "a motor's torque had been clipped for more than 0.5 s of a second at t = 0.5"
+    words = "guard torque: a motor's torque had been clipped for more than 50 % of a second at"
     said = shell("run", "airhockey-pd", *chatter, "--out", "run")
     assert said.status == 1
     assert words in said.out

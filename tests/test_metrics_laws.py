@@ -158,10 +158,10 @@ def test_energy_and_guards_are_those_of_the_whole_run(rng: np.random.Generator, 
         record = on_floor(record, (np.arange(ROWS) % 2).astype(float))
     saturated = rng.random((ROWS, 2)) < 0.9
     found, more = measured(scenario, record, saturated), besides(record, saturated)
-    works = energy.works(energy.Body(LEG, *mine), record, more.steps)
+    works = energy.balance(energy.Body(LEG, *mine), record, more.steps)
     assert found["energy"] == energy.measure(works)
     judged = guards.judge(
-        scenario.guards, LEG, record, branch=found["branch"], saturated=saturated, works=works,
+        scenario.guards, LEG, record, branch=found["branch"], saturated=saturated, balance=works,
         unsolved=more.unsolved,
     )  # fmt: skip
     assert [{**guard._asdict(), "ok": guard.ok} for guard in judged] == found["guards"]

@@ -93,7 +93,9 @@ def test_every_limit_is_there_with_value_and_verdict(
             seen.add(word)
             row = [SHOWN[limit.key][0], bounds(limit), shown(limit.key, limit.value), word]
             assert row in rows
-        assert ["branch flips", "none", "0", "pass"] in rows
+        for guard in ("branch", "loop", "torque", "energy", "solver"):
+            assert any(row[0] == f"guard {guard}" for row in rows)
+        assert ["guard branch", "<= 0", "0", "pass"] in rows
     assert seen == {"pass", "FAIL"}
 
 
@@ -253,7 +255,7 @@ def _with(key: str, value: object) -> Callable[[Path], object]:
         (_with("load.phase.share_A", [0.5]), "the lists of load.phase must be of one length"),
         (_with("load.phase", {"share_A": []}), "load.phase is not share_A and torque_rms"),
         (_with("guards", [{"name": "loop"}]), "guards are not those of a run"),
-        (_with("guards", MISSING), "guards are not those of a run"),
+        (_with("guards", MISSING), "has no guards: run its scenario.toml again"),
     ],
 )
 def test_damage_is_refused(

@@ -28,7 +28,7 @@ def run(
 ) -> int:
     """Simulate scenarios, judge them by their limits, write their run directories.
 
-    Exit status: 1 if a limit is broken or a run breaks down, 2 for input that is wrong.
+    Exit status: 1 if a limit is broken, a guard trips or a run breaks down, 2 for wrong input.
 
     Args:
         scenarios: Names of shipped scenarios or paths of TOML files; none: all that ship.

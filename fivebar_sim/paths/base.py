@@ -116,8 +116,9 @@ class FootPath(
             position = p(s),   velocity = p' s',   acceleration = p'' s'^2 + p' s''
 
         s' rises from 0 at t = 0 to 1 at t = T, s'' is 0 at both. So the foot starts from rest and
-        is never faster than on the nominal path: the start asks no more of motors and loop than the
-        path itself. The price: from t = ramp on this is the nominal path half a ramp late.
+        is never faster than on the nominal path; what it accelerates by along the path, up to
+        1.9 |p'| / T, is less than the path's own where the ramp is half a period or more. The
+        price: from t = ramp on this is the nominal path half a ramp late.
 
         Args:
             time: [s], shape (...).
@@ -228,7 +229,7 @@ def eased(time: Array, ramp: float) -> tuple[Array, Array, Array]:
 
 
 def check_ramp(path: FootPath) -> None:
-    """Raise unless the ramp is shorter than what the path moves: else it might rest within it.
+    """Raise unless the ramp is at most as long as the path moves: one that is mostly ramp is none.
 
     Raises:
         ArgumentError: Unless ramp <= moves.

@@ -193,6 +193,11 @@ GROUND = (
 )
 
 
+def _tripped(run: StoredRun) -> Cell:
+    """Return the names of the guards that tripped."""
+    return text(", ".join(each["name"] for each in run.metrics["guards"] if not each["ok"]))
+
+
 def _metrics(runs: Sequence[StoredRun]) -> str:
     """Return all metrics of all runs."""
     head: list[object] = ["metric"]
@@ -200,7 +205,8 @@ def _metrics(runs: Sequence[StoredRun]) -> str:
         tint = f"var(--run-{k % COLOURS + 1})"
         head.append(Cell(f'<span class="swatch" style="background: {tint}"></span>{text(name)}'))
     rows: list[list[object]] = [
-        ["verdict", *(html.judged(run.metrics["verdict"] == "pass") for run in runs)]
+        ["verdict", *(html.judged(run.metrics["verdict"] == "pass") for run in runs)],
+        ["guards that tripped", *(_tripped(run) for run in runs)],
     ]
     limits = [{limit.key: limit for limit in numbers.limits(run)} for run in runs]
     for key, (label, _, _) in SHOWN.items():

@@ -30,6 +30,12 @@ def check(run: StoredRun) -> None:
         RunDirectoryError: A metric is missing or no number; names the file and the key.
     """
     file = run.path / "metrics.json"
+    if "guards" not in run.metrics:
+        raise RunDirectoryError(f"{file} has no guards: run its scenario.toml again")
+    try:
+        guards.tripped(run.metrics["guards"])
+    except (KeyError, TypeError, ValueError):
+        raise RunDirectoryError(f"{file}: guards are not those of a run") from None
     for key in keys(run):
         try:
             value = metrics.look_up(run.metrics, key)
@@ -44,10 +50,6 @@ def check(run: StoredRun) -> None:
     bad = [value for value in numbers if value is not None and not is_finite(value)]
     if bad:
         raise RunDirectoryError(f"{file}: first_flip and phase must be numbers, got {bad[0]!r}")
-    try:
-        guards.broken(run.metrics["guards"])
-    except (KeyError, TypeError, ValueError):
-        raise RunDirectoryError(f"{file}: guards are not those of a run") from None
 
 
 def _phase(run: StoredRun, file: Path) -> list[Any]:

@@ -56,26 +56,27 @@ def _head(run: StoredRun) -> str:
         f"Tracking and load are measured from {window.start * h:.4g} s to {window.stop * h:.4g} s, "
         f"the loop gap over the whole run."
     )
-    passed = [f'<p class="fail">{text(said)}</p>' for said in guards.broken(metrics["guards"])]
+    tripped = [f'<p class="fail">{text(said)}</p>' for said in guards.tripped(metrics["guards"])]
     word = "pass" if good else "fail"
     return "\n".join(
         [
             f"<header>\n<h1>{text(scenario.name)}</h1>",
             f'<p><span class="verdict {word}">{"PASS" if good else "FAIL"}</span></p>',
-            *passed,
+            *tripped,
             f"<p>{text(about)}</p>\n</header>",
         ]
     )
 
 
 def _limits(run: StoredRun) -> str:
-    """Return every limit, the value, and whether it holds."""
+    """Return every limit and guard, the value, and whether it holds."""
     rows = [
         (SHOWN[limit.key][0], bounds(limit), shown(limit.key, limit.value), html.judged(limit.ok))
         for limit in numbers.limits(run)
     ]
-    flips = run.metrics["branch"]["flips"]
-    rows.append(("branch flips", "none", str(flips), html.judged(flips == 0)))
+    for guard in run.metrics["guards"]:
+        high, value = (f"{guard[key] or 0.0:.4g}" for key in ("high", "value"))
+        rows.append((f"guard {guard['name']}", f"<= {high}", value, html.judged(guard["ok"])))
     return html.table(
         "The run passes if all of these hold.", ("metric", "limit", "value", ""), rows
     )
