@@ -34,6 +34,11 @@ class Wrong(msgspec.Struct, frozen=True, kw_only=True):
     kind: str = "shape"
     def setpoints(self, leg, servo, motion, integrator):
         u = motion.q[1:][:, [0, 2]]
+        if self.kind == "raise":
+            raise RuntimeError("out of coffee")
+        if self.kind == "refuse":
+            from fivebar_sim.errors import ConfigError
+            raise ConfigError("controller.gain must be in [0, 1], got 2")
         if self.kind == "shape":
             return u[:-1]
         u[3, 1] = float(self.kind)
@@ -161,6 +166,20 @@ def test_setpoints_of_wrong_shape_or_not_finite_are_refused(
         "controller 'wrong' must plan finite setpoints [rad] of shape (800, 2)"
     )
     assert came in message
+
+
+@pytest.mark.parametrize(
+    ("kind", "said"),
+    [
+        ("raise", "controller 'wrong' failed: RuntimeError: out of coffee"),
+        ("refuse", "controller.gain must be in [0, 1], got 2"),
+    ],
+)
+def test_controller_that_fails_is_one_line_and_its_own_refusal_stays(
+    plug: Plug, kind: str, said: str
+) -> None:
+    plug("strangers", {"wrong": "strangers:Wrong"})
+    assert refused(f"controller={{name='wrong', kind='{kind}'}}") == said
 
 
 @pytest.mark.parametrize(

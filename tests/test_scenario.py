@@ -249,6 +249,7 @@ def test_name_that_is_no_file_name_is_refused(tmp_path: Path, name: str) -> None
         ("servo.kp=0", "servo.kp must be in (0, inf) N m/rad, got 0.0"),
         ("servo.kd=-1", "servo.kd must be in [0, inf) N m s/rad, got -1.0"),
         ("servo.limit=0", "servo.limit must be in (0, inf) N m, got 0.0"),
+        ("servo.rate=3000", "servo.rate must be in (0, 1000] Hz, at most one command a timestep"),
         ("servo.preset=xl", "servo.preset: unknown servo preset 'xl'; known: hobby-9g, ideal,"),
         ("controller=servo", "controller must be a table, got 'servo'"),
         ("controller.name=servoo", "controller.name: unknown controller 'servoo'; known: computed"),

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import math
+import re
 from functools import cache
+from pathlib import Path
 
 import faults_disturbed as disturbed
 import pytest
 
 from fivebar_sim import baseline, control, regression, resources, rollout, scenes
 from fivebar_sim.errors import FiveBarError
+from fivebar_sim.guards import Guards
 from fivebar_sim.metrics import Limit
 from fivebar_sim.rollout import Plan, Result
 from fivebar_sim.scenario import Scenario
@@ -169,3 +172,19 @@ def test_each_controller_sees_other_gains(name: str) -> None:
     """10 % more or 10 % less of each is red; the servos' gains are those of the model above."""
     more, less = (unseen(disturbed.in_gain(planned(name), factor)) for factor in (1.1, 0.9))
     assert more & less == UNSEEN_GAINS.get(name, set())
+
+
+def test_guards_stay_far_below_their_bounds() -> None:
+    """What docs/model.md says of them, in the bounds' own parts."""
+    most = dict.fromkeys(("loop", "ground", "torque", "energy", "constraints", "step"), 0.0)
+    for result in results().values():
+        for guard in result.metrics["guards"]:
+            if guard["name"] in most:
+                bound = getattr(result.scenario.guards, guard["name"])
+                part = bound * guard["value"] / guard["high"]
+                most[guard["name"]] = max(most[guard["name"]], part)
+    page = (Path(__file__).parents[1] / "docs" / "model.md").read_text("utf-8")
+    for name, part in most.items():
+        bound, shipped = re.findall(rf"\| `{name}` \| .* \| (.*) \| (.*) \|", page)[0]
+        assert getattr(Guards(), name) == float(bound)
+        assert 0.5 * float(shipped) < part <= float(shipped)

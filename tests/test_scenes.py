@@ -284,3 +284,8 @@ def test_refusal_names_the_key(keys: str, message: str) -> None:
 def test_refusal_of_an_unknown_scene() -> None:
     with pytest.raises(ArgumentError, match="unknown scene 'moon'; known: air, payload"):
         scenes.named("moon")
+
+
+def test_rail_that_ends_above_the_hip_is_refused() -> None:
+    with pytest.raises(ConfigError, match=r"^scene\.stop must be in \[0, 0\.136\] m, the hip's h"):
+        rollout.plan(Scenario.load("rail-landing", ["scene.stop=1"]))

@@ -116,6 +116,8 @@ def test_refusal_of_setpoints_that_are_not_finite() -> None:
     ctrl[7, 1] = np.nan
     with pytest.raises(ArgumentError, match="ctrl must be finite"):
         simulate.simulate(plan.model, plan.motion.q[:1], ctrl[None])
+    with pytest.raises(ArgumentError, match=r"qpos must have shape \(nsim, 4\), got \(1, 3\)"):
+        simulate.simulate(plan.model, plan.motion.q[:1, :3], plan.ctrl[None])
     with pytest.raises(ArgumentError, match=r"ctrl must have shape \(1, N, 2\)"):
         simulate.simulate(plan.model, plan.motion.q[:1], ctrl)
 
