@@ -24,6 +24,10 @@ WITHIN = 1.0
 """The time [s] within which clipped torque is added up; of a shorter run, all of it."""
 
 
+FAINT = 0.1
+"""Changes of torque by at most this part of a run's largest are too faint to be chatter."""
+
+
 class Guards(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """How far a run may go and still be one.
 
@@ -32,6 +36,8 @@ class Guards(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
         ground: Deepest that the foot may sink into the floor, in parts of its ball's diameter.
         torque: Greatest part of any second, or of a shorter run, in which a motor's torque may be
             clipped; 1 is all of it.
+        chatter: Greatest part of any second, or of a shorter run, in which a motor's torque may go
+            up and down with every command.
         energy: Greatest imbalance of the energy, in parts of what was turned over.
         constraints: Most that loop, gear friction and ends of travel may give, in the same parts.
         step: Most that MuJoCo's steps may give or take by themselves, in the same parts.
@@ -40,6 +46,7 @@ class Guards(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     loop: float = 0.01
     ground: float = 1.0
     torque: float = 0.5
+    chatter: float = 0.4
     energy: float = 1e-3
     constraints: float = 0.01
     step: float = 0.02
@@ -48,6 +55,7 @@ class Guards(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
         check_number("loop", self.loop, "", low=0.0)
         check_number("ground", self.ground, "", low=0.0)
         check_number("torque", self.torque, "", low=0.0, high=1.0)
+        check_number("chatter", self.chatter, "", low=0.0, high=1.0)
         for part in ("energy", "constraints", "step"):
             check_number(part, getattr(self, part), "", low=0.0)
 
@@ -89,6 +97,11 @@ SAID = {
         ", for {:.3g} % at worst",
         1e2,
     ),
+    "chatter": (
+        "a motor's torque had turned round with every command in more than {:.3g} % of a second",
+        ", in {:.3g} % at worst",
+        1e2,
+    ),
     "energy": (
         "more than {:.3g} % of the energy turned over was unaccounted for",
         ", {:.3g} % at worst",
@@ -119,6 +132,7 @@ def judge(
     saturated: Bools,
     balance: Balance,
     unsolved: Bools,
+    command: int,
 ) -> list[Guard]:
     """Return every guard of a run, over all of its steps.
 
@@ -130,12 +144,14 @@ def judge(
         saturated: Whether the torque limit clipped A and E in each step, (N, 2).
         balance: The work of each step.
         unsolved: Whether the constraint solver ran out of iterations in each step, (N,).
+        command: Steps from one command of the motors to the next.
     """
     time = record["time"]
     found = [
         Guard("branch", float(branch["flips"]), 0.0, branch["first_flip"]),
         _highest("loop", record["gap"], bounds.loop * leg.size, time),
         _highest("torque", _clipped(saturated, time), bounds.torque, time),
+        _highest("chatter", _chattering(record, command), bounds.chatter, time),
         _part("energy", balance.unaccounted, bounds.energy, balance, time),
         _part("constraints", balance.given, bounds.constraints, balance, time),
         _part("step", np.cumsum(balance.step), bounds.step, balance, time),
@@ -163,10 +179,37 @@ def _first(chosen: Bools, time: Array) -> float | None:
 
 def _clipped(saturated: Bools, time: Array) -> Array:
     """Return in which part of the second before it the worse motor was clipped, (N,)."""
-    steps = min(max(1, round(WITHIN / float(time[0]))), len(time))
-    so_far = np.concatenate([np.zeros((1, 2)), np.cumsum(saturated, axis=0)])
-    begin = np.maximum(np.arange(1, len(time) + 1) - steps, 0)
-    return (so_far[1:] - so_far[begin]).max(axis=1) / steps
+    window = _window(time)
+    return _sums(saturated, window).max(axis=1) / window
+
+
+def _chattering(record: Mapping[str, Array], command: int) -> Array:
+    """Return in which part of the second before it the worse motor's torque chattered, (N,).
+
+    It does in a step if it goes up and down, by more than `FAINT` of the run's largest torque, with
+    two commands one after the other: d = tau_k - tau_k-P of the other sign than P steps before, P
+    the steps of a command.
+    """
+    torque = np.stack([record["torque_A"], record["torque_E"]], axis=-1)
+    d = np.zeros_like(torque)
+    d[command:] = torque[command:] - torque[:-command]
+    d[np.abs(d) <= FAINT * np.abs(torque).max()] = 0.0
+    chatters = np.zeros(torque.shape, dtype=bool)
+    chatters[command:] = d[command:] * d[:-command] < 0.0
+    window = _window(record["time"])
+    return _sums(chatters, window).max(axis=1) / window
+
+
+def _window(time: Array) -> int:
+    """Return the steps of `WITHIN`, or of a shorter run."""
+    return min(max(1, round(WITHIN / float(time[0]))), len(time))
+
+
+def _sums(values: Bools, window: int) -> Array:
+    """Return the sums over the steps of a window that ends with each step, (N, 2)."""
+    so_far: Array = np.concatenate([np.zeros((1, 2)), np.cumsum(values, axis=0, dtype=float)])
+    begin = np.maximum(np.arange(1, len(values) + 1) - window, 0)
+    return so_far[1:] - so_far[begin]
 
 
 def _part(name: str, energy: Array, high: float, balance: Balance, time: Array) -> Guard:

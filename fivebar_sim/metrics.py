@@ -119,6 +119,7 @@ def measure(scenario: Scenario, record: Mapping[str, Array], besides: Unrecorded
         saturated=saturated,
         balance=balance,
         unsolved=besides.unsolved,
+        command=scenario.command,
     )
     window = scenario.window
     error, gap = tracking_error(record)[window], record["gap"]

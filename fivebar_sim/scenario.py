@@ -87,6 +87,13 @@ class Scenario(msgspec.Struct, frozen=True, kw_only=True):
         return slice(first, min(round(min(self.path.rest, self.duration) / h), last))
 
     @property
+    def command(self) -> int:
+        """The steps from one command of the motors to the next: the controller's, or the bus's."""
+        own = self.controller.period if isinstance(self.controller, Feedback) else 0.0
+        bus = 1.0 / self.servo.rate if self.servo.rate else 0.0
+        return max(1, round(max(own, bus) / self.sim.timestep))
+
+    @property
     def times(self) -> Array:
         """The times of all steps [s], (N + 1,)."""
         return np.arange(self.steps + 1, dtype=np.float64) * self.sim.timestep

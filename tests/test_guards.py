@@ -10,6 +10,7 @@ import pytest
 from shell import Shell
 
 from fivebar_sim import guards, rollout
+from fivebar_sim.arrays import Array
 from fivebar_sim.errors import ArgumentError, ConfigError
 from fivebar_sim.geometry import FiveBar
 from fivebar_sim.guards import Guard, Guards
@@ -52,10 +53,16 @@ def tripped(result: Result) -> dict[str, Guard]:
             "guard ground: the foot was in the floor by more than 12 mm at t = 0.4",
         ),
         (
-            "airhockey-pd",
-            CHATTER,
+            "q8bot-trot",
+            ("servo=hobby-9g",),
             "torque",
             "guard torque: a motor's torque had been clipped for more than 50 % of a second at",
+        ),
+        (
+            "airhockey-pd",
+            (*CHATTER, "controller.kp=60", "controller.kd=2.5", "servo.limit=30", "duration=3"),
+            "chatter",
+            "guard chatter: a motor's torque had turned round with every command in more than",
         ),
         (
             "rail-landing",
@@ -124,12 +131,30 @@ def test_clipped_time_is_of_the_worse_motor_within_a_second() -> None:
     assert short[[0, 14, 29]] == pytest.approx([1 / 30, 0.5, 1.0])
 
 
+def test_chatter_is_up_and_down_with_every_command_and_lasts(rng: np.random.Generator) -> None:
+    """3 s at 1 ms, a command every 10 ms: of A, while E does as the motion asks for."""
+    time = np.arange(1.0, 3001.0) * 1e-3
+    command = np.arange(3000) // 10
+    turning, load = np.where(command % 2, 1.0, -1.0), np.sin(2.0 * np.pi * 2.0 * time)
+
+    def most(torque: Array) -> float:
+        record = {"time": time, "torque_A": torque, "torque_E": load}
+        return float(guards._chattering(record, 10).max())
+
+    assert most(3.0 + 0.5 * turning) == 1.0  # on top of a load too
+    assert most(np.where(time < 0.3, turning, 0.1 * load)) == pytest.approx(0.28, abs=0.021)
+    assert most(load + turning * np.exp(-20.0 * np.mod(time, 1.0))) < 0.2  # rings down
+    assert most(load + 0.02 * turning) == 0.0  # too faint
+    assert 0.5 < most(np.repeat(rng.standard_normal(300), 10)) < 0.8  # noise alone is none either
+    assert most(load) == 0.0
+
+
 def test_bounds_are_in_parts_of_the_leg() -> None:
     long = ran("classic-ellipse", "duration=1", "guards.loop=0.02").metrics["guards"]
     (loop,) = (each for each in long if each["name"] == "loop")
     assert loop["high"] == pytest.approx(0.02 * FiveBar.load("classic").size)
     assert {each["name"] for each in long} == {
-        *("branch", "loop", "torque", "energy", "constraints", "step", "solver")
+        *("branch", "loop", "torque", "chatter", "energy", "constraints", "step", "solver")
     }
 
 

@@ -162,7 +162,7 @@ def test_energy_and_guards_are_those_of_the_whole_run(rng: np.random.Generator, 
     assert found["energy"] == energy.measure(works)
     judged = guards.judge(
         scenario.guards, LEG, record, branch=found["branch"], saturated=saturated, balance=works,
-        unsolved=more.unsolved,
+        unsolved=more.unsolved, command=1,
     )  # fmt: skip
     assert [{**guard._asdict(), "ok": guard.ok} for guard in judged] == found["guards"]
     passed = {guard["name"]: guard["ok"] for guard in found["guards"]}
