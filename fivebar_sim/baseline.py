@@ -149,6 +149,8 @@ def read(path: Path) -> Baseline | None:
     except (ValueError, RecursionError) as error:
         raise ConfigError(f"{path} is no baseline: not JSON: {error}") from None
     where = f"{path} is no baseline"
+    if tables.is_deep(table):
+        raise ConfigError(f"{where}: nested too deep")
     if not isinstance(table, dict):
         raise ConfigError(f"{where}: it must be a table, got {str(table)[:40]}")
     tables.check_keys(table, ("made", "metrics"), where)

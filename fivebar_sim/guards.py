@@ -46,7 +46,7 @@ class Guards(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     loop: float = 0.01
     ground: float = 1.0
     torque: float = 0.5
-    chatter: float = 0.4
+    chatter: float = 0.5
     energy: float = 1e-3
     constraints: float = 0.01
     step: float = 0.02

@@ -18,6 +18,10 @@ T = TypeVar("T")
 Table = dict[str, Any]
 
 
+DEEPEST = 20
+"""Tables and arrays in each other that an input may have; the deepest that means anything is 4."""
+
+
 def read(path: Path, what: str) -> Table:
     """Return the table of a TOML file; `what` names the kind of file in messages.
 
@@ -40,9 +44,27 @@ def _loads(text: str) -> Table:
         ValueError: Not TOML, or an integer too long for Python to read.
     """
     try:
-        return tomllib.loads(text)
+        table = tomllib.loads(text)
     except RecursionError:
         raise ValueError("nested too deep") from None
+    if is_deep(table):
+        raise ValueError(f"nested too deep: at most {DEEPEST} tables or arrays in each other")
+    return table
+
+
+def is_deep(value: Any) -> bool:
+    """Return whether more than `DEEPEST` tables or arrays are nested in a value."""
+    level = [value]
+    for _ in range(DEEPEST):
+        nests = [each for each in level if isinstance(each, (list, Mapping))]
+        if not nests:
+            return False
+        level = [
+            inner
+            for each in nests
+            for inner in (each.values() if isinstance(each, Mapping) else each)
+        ]
+    return any(isinstance(each, (list, Mapping)) for each in level)
 
 
 def parse_setting(setting: str) -> tuple[list[str], Any]:
@@ -53,7 +75,7 @@ def parse_setting(setting: str) -> tuple[list[str], Any]:
     """
     key, equals, text = setting.partition("=")
     parts = [part.strip().strip("\"'") for part in key.split(".")]
-    if not equals or not all(parts) or not _is_utf8(setting):
+    if not equals or not all(parts) or not _is_utf8(setting) or len(parts) > DEEPEST:
         raise ConfigError(f"--set takes KEY=VALUE, got {setting!r}")
     try:
         table = _loads(f"value = {text}")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import tomllib
 from datetime import date
 from pathlib import Path
 from typing import Any, Literal
@@ -221,3 +222,12 @@ def test_wrong_limit_is_refused(table: Any, message: str) -> None:
     with pytest.raises(ConfigError) as caught:
         tables.bounds(table, ["tracking.rms", "warnings"], "limits", "run.toml")
     assert str(caught.value).startswith(f"run.toml: {message}")
+
+
+def test_inputs_are_not_nested_beyond_what_means_anything() -> None:
+    deepest = tables.DEEPEST
+    assert not tables.is_deep(tomllib.loads(".".join(["a"] * deepest) + " = 1"))
+    assert tables.is_deep(tomllib.loads(".".join(["a"] * (deepest + 1)) + " = 1"))
+    assert tables.is_deep(tomllib.loads("a = " + "[" * 30 + "]" * 30))
+    with pytest.raises(ConfigError, match="--set takes KEY=VALUE"):
+        tables.parse_setting(".".join(["a"] * (deepest + 1)) + "=1")
