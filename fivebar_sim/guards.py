@@ -21,8 +21,7 @@ from fivebar_sim.energy import Balance
 from fivebar_sim.geometry import FiveBar
 
 WITHIN = 1.0
-"""The time [s] within which clipped torque is added up; of a shorter run, all of it."""
-
+"""Over this time [s] clipped and chattering steps are added up; of a shorter run, over all."""
 
 FAINT = 0.1
 """Changes of torque by at most this part of a run's largest are too faint to be chatter."""

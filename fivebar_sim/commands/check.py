@@ -28,7 +28,7 @@ def check(
     keep: Annotated[Path, arg(metavar="DIR")] = Path("runs/failed"),
     quiet: bool = False,
 ) -> int:
-    """Run scenarios against their limits and baselines; exit status 1 if any is broken.
+    """Run scenarios against limits, guards and baselines; exit status 1 if any is broken.
 
     The baseline of FILE.toml is baselines/FILE.json beside it: what the metrics were, and how far
     each may move. A metric that got worse than that fails; one that got better is reported. Without
