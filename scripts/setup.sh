@@ -1,28 +1,29 @@
-# Sourced by demo and test: makes .venv with exactly what requirements.lock pins, once per lock.
-# Needs Python 3.11 or newer with pip and venv; PYTHON=... chooses which.
+# Sourced by demo, test and docs with `kind` set to run or dev: brings .venv to what the locks say.
+# Needs Python 3.11 or newer with venv and pip; PYTHON=... chooses which.
 set -eu
 root=$(CDPATH='' cd -- "$(dirname -- "$0")/.." && pwd)
 cd "$root"
 
-find_python() {
-    for candidate in ${PYTHON:-} python3 python3.13 python3.12 python3.11 python; do
-        if "$candidate" -c 'import sys, venv; sys.exit(sys.version_info < (3, 11))' 2>/dev/null; then
+fits='import sys; sys.exit(sys.version_info < (3, 11))'
+whole='import ensurepip, venv'
+
+find_python() { # prints the first Python that will do, or says why there is none
+    set -- python3 python3.14 python3.13 python3.12 python3.11 python
+    if [ -n "${PYTHON:-}" ]; then set -- "$PYTHON"; fi
+    for candidate; do
+        version=$("$candidate" --version 2>/dev/null) || continue
+        if ! "$candidate" -c "$fits" 2>/dev/null; then
+            seen="${seen:-}, $candidate is $version"
+        elif ! "$candidate" -c "$whole" 2>/dev/null; then
+            seen="${seen:-}, $candidate ($version) has no venv (Debian: apt install python3-venv)"
+        else
             echo "$candidate"
             return
         fi
     done
-    echo "fivebar-sim needs Python 3.11 or newer with venv; set PYTHON to its path" >&2
-    exit 1
+    echo "fivebar-sim needs Python 3.11 or newer with venv${seen:-, none was found}; set PYTHON to one" >&2
+    return 1
 }
 
-wanted="$(cat requirements.lock pyproject.toml | cksum) $root"
-if [ "$(cat .venv/installed 2>/dev/null || true)" != "$wanted" ]; then
-    python=$(find_python)
-    echo "Setting up .venv with $("$python" --version) ..."
-    "$python" -m venv --clear .venv
-    .venv/bin/python -m pip install --quiet --disable-pip-version-check --require-hashes \
-        -r requirements.lock
-    .venv/bin/python -m pip install --quiet --disable-pip-version-check --no-deps \
-        --no-build-isolation --editable .
-    echo "$wanted" > .venv/installed
-fi
+python=$(find_python)
+"$python" scripts/make_env.py "$kind"

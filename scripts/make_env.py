@@ -1,0 +1,210 @@
+"""python scripts/make_env.py {run,dev} [--pip VERSION] [--dry-run]: makes .venv as the locks say.
+
+    run    requirements.lock: what a run needs
+    dev    requirements-dev.lock besides: what the tests and developers need
+
+Nothing is resolved: both locks are complete, so pip installs each line of them and no more, only
+from wheels, and only with the locked hashes. What is there already stays; a lock that changed is
+installed anew. The environment says in its file `installed` what it holds. That is written last, so
+that an interrupted set-up is never taken for a whole one.
+
+--dry-run prints what pip would install, NAME==VERSION a line.
+
+Needs the standard library alone: it runs before anything is installed.
+"""
+
+from __future__ import annotations
+
+import argparse
+import hashlib
+import json
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+LOCKS = {"run": ["requirements.lock"], "dev": ["requirements.lock", "requirements-dev.lock"]}
+"""The locks of each set-up, in the order in which they are installed."""
+
+INSTALL = ["install", "--quiet", "--disable-pip-version-check", "--no-input", "--no-deps"]
+"""Without pip's resolver, which until 23.3 takes the newest release where an extra is asked for."""
+
+FROM_LOCK = ["--require-hashes", "--only-binary=:all:", "--no-compile"]
+"""No build from source, which may need a compiler; bytecode is written for what is imported."""
+
+NETWORK = "the package index cannot be reached (is there a network?)"
+NO_VENV = "this Python lacks a part of venv or pip (Debian: apt install python3-venv)"
+CAUSES = {
+    "No space left on device": "the disk is full",
+    "Disk quota exceeded": "the disk quota is used up",
+    "DO NOT MATCH THE HASHES": "a hash of the lock does not fit the file that came",
+    "Hashes are required": "the lock lacks a hash",
+    "Invalid requirement": "the lock has a line that is no requirement",
+    "name resolution": NETWORK,
+    "Connection": NETWORK,
+    "timed out": NETWORK,
+    "(from versions: none)": f"{NETWORK}, or it has no wheel for this Python",
+    "No matching distribution": "the package index does not have a release that the lock names",
+    "ensurepip": NO_VENV,
+    "No module named": NO_VENV,
+}
+"""What words of pip and venv mean, most telling first."""
+
+
+class SetUpError(Exception):
+    """Says in one line why there is no environment."""
+
+
+def explain(output: str) -> str:
+    """Return the cause of a failure in one line, with the program's own words."""
+    lines = [line.strip() for line in output.splitlines() if line.strip()] or ["no output"]
+    errors = [line for line in lines if "ERROR" in line or "Error" in line] or lines
+
+    for sign, meaning in CAUSES.items():
+        if sign in output:
+            about = [line for line in lines if "==" in line or sign in line]
+            # of a hash that does not fit pip names the package below, of all else in the same line
+            words = about[-1] if "HASHES" in sign else about[0]
+            return f"{meaning}: {words.removeprefix('ERROR: ')[:200]}"
+    return errors[-1].removeprefix("ERROR: ")[:200]
+
+
+def call(*command: str | Path) -> str:
+    """Return the output of a command that must succeed."""
+    # A user's settings for other environments must not send packages elsewhere.
+    aside = {"PIP_TARGET", "PIP_PREFIX", "PIP_ROOT", "PIP_NO_BINARY", "PYTHONHOME", "PYTHONPATH"}
+    env = {key: value for key, value in os.environ.items() if key not in aside}
+    env |= {"PIP_USER": "0", "PIP_REQUIRE_VIRTUALENV": "0"}
+
+    done = subprocess.run([str(part) for part in command], capture_output=True, text=True, env=env)
+    if done.returncode:
+        raise SetUpError(explain(done.stdout + done.stderr))
+    return done.stdout
+
+
+def fingerprint(root: Path, *files: str) -> str:
+    """Return what an environment depends on: the content of files, this Python and the place."""
+    content = [(root / file).read_bytes() for file in files]
+    origin = f"{sys.version}\n{sys.base_prefix}\n{root}\n".encode()
+    return hashlib.sha256(b"\0".join([origin, *content])).hexdigest()
+
+
+class Environment:
+    """A virtual environment and the record of what was installed into it."""
+
+    def __init__(self, place: Path) -> None:
+        self.place = place
+        self.python = place / "bin" / "python"
+        self.record = place / "installed"
+
+    def holds(self) -> dict[str, str]:
+        """Return the fingerprint of each part that was installed to the end."""
+        try:
+            return json.loads(self.record.read_text(encoding="utf-8"))
+        except (OSError, ValueError):
+            return {}
+
+    def add(self, part: str, mark: str) -> None:
+        """Write down that a part is whole: all of the record, or as it was before."""
+        text = json.dumps(self.holds() | {part: mark}, indent=1)
+        new = self.record.with_suffix(".new")
+        new.write_text(text, encoding="utf-8")
+        new.replace(self.record)
+
+    def pip(self, *args: str | Path) -> str:
+        """Return the output of the environment's own pip."""
+        return call(self.python, "-m", "pip", *args)
+
+    def make(self, pip: str | None) -> None:
+        """Make an empty environment, with this Python's pip or another release of it."""
+        if self.place.is_dir():
+            shutil.rmtree(self.place)
+        call(sys.executable, "-m", "venv", self.place)
+        if pip:
+            self.pip(*INSTALL, "--upgrade", "pip" if pip == "newest" else f"pip=={pip}")
+
+
+def set_up(root: Path, kind: str, pip: str | None = None) -> None:
+    """Bring .venv to what a kind of set-up asks for.
+
+    Raises:
+        SetUpError: If a step fails. An environment that was whole for another kind stays whole.
+    """
+    env = Environment(root / ".venv")
+    locks = LOCKS[kind]
+    base = fingerprint(root, locks[0])
+    if env.holds().get(locks[0]) != base or not env.python.exists():
+        print(f"Setting up .venv with Python {sys.version.split()[0]} ...", flush=True)
+        try:
+            env.make(pip)
+            env.pip(*INSTALL, *FROM_LOCK, "-r", root / locks[0])
+        except BaseException:
+            shutil.rmtree(env.place, ignore_errors=True)
+            raise
+        env.add(locks[0], base)
+
+    for lock in locks[1:]:
+        mark = fingerprint(root, locks[0], lock)
+        if env.holds().get(lock) != mark:
+            print("Adding what the tests need ...", flush=True)
+            env.pip(*INSTALL, *FROM_LOCK, "-r", root / lock)
+            # Else a warning of the compiler, met while a test imports, would be that test's error.
+            call(env.python, "-m", "compileall", "-qq", "-j0", env.place / "lib")
+            say_what_is_left_out()
+            env.add(lock, mark)
+
+    mark = fingerprint(root, "pyproject.toml", *locks)
+    if env.holds().get("fivebar-sim") != mark:
+        env.pip(*INSTALL, "--no-index", "--no-build-isolation", "--editable", root)
+        env.pip("check", "--disable-pip-version-check")
+        env.add("fivebar-sim", mark)
+
+
+def say_what_is_left_out() -> None:
+    """Print which extra this Python cannot have."""
+    if sys.version_info >= (3, 13):
+        version = ".".join(str(number) for number in sys.version_info[:2])
+        print(f"dm-control is left out: its labmaze has no wheel for Python {version}.")
+
+
+def would_install(root: Path, kind: str, pip: str | None = None) -> list[str]:
+    """Return NAME==VERSION of all that pip would install, asked in a temporary environment."""
+    found = []
+    with tempfile.TemporaryDirectory() as folder:
+        env = Environment(Path(folder) / "env")
+        env.make(pip)
+        for lock in LOCKS[kind]:
+            report = Path(folder) / "report.json"
+            env.pip(*INSTALL, *FROM_LOCK, "--dry-run", "--report", report, "-r", root / lock)
+            items = json.loads(report.read_text(encoding="utf-8"))["install"]
+            found += [f"{i['metadata']['name']}=={i['metadata']['version']}" for i in items]
+    return sorted(found, key=str.lower)
+
+
+def main() -> int:
+    """Set up, or say what would be installed; return the exit status."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("kind", choices=LOCKS)
+    parser.add_argument("--pip", metavar="VERSION", help="another pip, or newest")
+    parser.add_argument("--dry-run", action="store_true", help="only print what would be installed")
+    args = parser.parse_args()
+
+    root = Path(__file__).resolve().parents[1]
+    try:
+        if args.dry_run:
+            print("\n".join(would_install(root, args.kind, args.pip)))
+        else:
+            set_up(root, args.kind, args.pip)
+    except (SetUpError, OSError) as error:
+        print(f"fivebar-sim could not be set up: {error}", file=sys.stderr)
+        return 1
+    except KeyboardInterrupt:
+        print("fivebar-sim could not be set up: interrupted", file=sys.stderr)
+        return 130
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,181 @@
+"""Setting up .venv: what is installed, what is left after a failure, and what the user is told."""
+
+from __future__ import annotations
+
+import importlib.util
+import re
+import sys
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+
+
+def load(name: str) -> ModuleType:
+    """Return a script as a module."""
+    spec = importlib.util.spec_from_file_location(name, ROOT / "scripts" / f"{name}.py")
+    assert spec
+    assert spec.loader
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+make_env = load("make_env")
+
+
+class Pip:
+    """Stands in for venv and pip: keeps the commands, makes what venv makes, fails where told."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        self.commands: list[str] = []
+        self.fails_on = "nothing"
+        monkeypatch.setattr(make_env, "call", self)
+
+    def __call__(self, *command: str | Path) -> str:
+        """Do as the command would."""
+        line = " ".join(str(part) for part in command)
+        self.commands.append(line)
+        if self.fails_on in line:
+            raise make_env.SetUpError("told to")
+        if "-m venv" in line:
+            (Path(command[-1]) / "bin").mkdir(parents=True)
+            (Path(command[-1]) / "bin" / "python").touch()
+        return ""
+
+    def installed(self) -> list[str]:
+        """Return the locks that were installed since the last question."""
+        found = [line for line in self.commands if "--require-hashes" in line]
+        self.commands.clear()
+        return [line.split("/")[-1] for line in found]
+
+
+@pytest.fixture
+def pip(monkeypatch: pytest.MonkeyPatch) -> Pip:
+    return Pip(monkeypatch)
+
+
+@pytest.fixture
+def root(tmp_path: Path) -> Path:
+    for file in ("pyproject.toml", *make_env.LOCKS["dev"]):
+        (tmp_path / file).write_text(f"# {file}\n", encoding="utf-8")
+    return tmp_path
+
+
+BOTH = ["requirements.lock", "requirements-dev.lock"]
+
+
+def test_each_kind_installs_its_locks_once(root: Path, pip: Pip) -> None:
+    make_env.set_up(root, "run")
+    assert pip.installed() == ["requirements.lock"]
+    make_env.set_up(root, "dev")
+    assert pip.installed() == ["requirements-dev.lock"]
+    for kind in ("run", "dev", "run"):
+        make_env.set_up(root, kind)
+        assert pip.installed() == []
+
+
+def test_lock_that_changed_is_installed_anew(root: Path, pip: Pip) -> None:
+    make_env.set_up(root, "dev")
+    assert pip.installed() == BOTH
+    (root / "requirements.lock").write_text("# newer\n", encoding="utf-8")
+    (root / ".venv" / "stale").touch()
+    make_env.set_up(root, "dev")
+    assert pip.installed() == BOTH
+    assert not (root / ".venv" / "stale").exists()
+
+    (root / "pyproject.toml").write_text("# newer\n", encoding="utf-8")
+    make_env.set_up(root, "dev")
+    assert [line for line in pip.commands if "--editable" in line]
+    assert pip.installed() == []
+
+
+@pytest.mark.parametrize("step", ["-m venv", "--require-hashes"])
+def test_environment_that_failed_is_gone(root: Path, pip: Pip, step: str) -> None:
+    pip.fails_on = step
+    with pytest.raises(make_env.SetUpError, match="told to"):
+        make_env.set_up(root, "run")
+    assert not (root / ".venv").exists()
+
+
+@pytest.mark.parametrize("step", ["-dev.lock", "compileall", "--editable", " check"])
+def test_part_that_failed_is_tried_again(root: Path, pip: Pip, step: str) -> None:
+    pip.fails_on = step
+    with pytest.raises(make_env.SetUpError, match="told to"):
+        make_env.set_up(root, "dev")
+    pip.commands.clear()
+    pip.fails_on = "nothing"
+    make_env.set_up(root, "dev")
+    assert any("--editable" in line for line in pip.commands)
+    assert any(step in line for line in pip.commands)
+    assert "requirements.lock" not in pip.installed()  # that part was whole
+
+
+def test_pip_resolves_and_builds_nothing(root: Path, pip: Pip) -> None:
+    make_env.set_up(root, "dev", pip="23.0.1")
+    installs = [line.split() for line in pip.commands if "pip install" in line]
+    assert len(installs) == 4
+    assert all("--no-deps" in words for words in installs)
+    assert sum("--only-binary=:all:" in words for words in installs) == 2
+    assert sum("--no-index" in words for words in installs) == 1  # the project itself
+
+
+# what the user is told
+
+
+@pytest.mark.parametrize(
+    ("output", "line"),
+    [
+        (
+            "ERROR: Could not install packages due to an OSError: No space left on device",
+            "the disk is full: Could not install packages due to",
+        ),
+        (
+            "ERROR: THESE PACKAGES DO NOT MATCH THE HASHES FROM THE REQUIREMENTS FILE. If you\n"
+            "    attrs==26.1.0 from somewhere:\n  Expected sha256 00\n  Got        11",
+            "a hash of the lock does not fit the file that came: attrs==26.1.0 from",
+        ),
+        (
+            "ERROR: Could not find a version that satisfies a==1 (from versions: none)"
+            "\nERROR: No matching distribution found for a==1",
+            "the package index cannot be reached (is there a network?), or it has no wheel",
+        ),
+        (
+            "ERROR: Could not find a version that satisfies a==9 (from versions: 1)"
+            "\nERROR: No matching distribution found for a==9",
+            "the package index does not have a release that the lock names: Could not find",
+        ),
+        ("/usr/bin/python3: No module named ensurepip", "this Python lacks a part of venv or pip"),
+        ("Traceback\n  x\nOSError: odd", "OSError: odd"),
+        ("", "no output"),
+    ],
+)
+def test_cause_is_one_clear_line(output: str, line: str) -> None:
+    assert make_env.explain(output).startswith(line)
+    assert "\n" not in make_env.explain(output)
+
+
+def test_failure_of_a_program_is_explained() -> None:
+    with pytest.raises(make_env.SetUpError, match="OSError: no such thing"):
+        make_env.call(sys.executable, "-c", "raise OSError('no such thing')")
+
+
+# the locks
+
+
+def names(file: str) -> set[str]:
+    """Return the packages of a lock."""
+    text = (ROOT / file).read_text(encoding="utf-8")
+    return set(re.findall(r"^([a-z0-9-]+)==", text, re.MULTILINE))
+
+
+def test_locks_share_no_package_and_all_is_hashed() -> None:
+    run, dev = (names(file) for file in BOTH)
+    assert {"mujoco", "numpy", "rerun-sdk", "gymnasium", "hatchling"} <= run
+    assert {"pytest", "ruff", "dm-control"} <= dev
+    assert not run & dev
+    for file in BOTH:
+        entries = re.split(r"^(?=[a-z0-9])", (ROOT / file).read_text("utf-8"), flags=re.MULTILINE)
+        assert [e.split()[0] for e in entries[1:] if "--hash=sha256:" not in e] == []
