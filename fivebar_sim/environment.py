@@ -12,7 +12,6 @@ from typing import Any
 
 import mujoco
 import numpy as np
-from dm_env import specs
 
 from fivebar_sim import gl, tasks
 from fivebar_sim.arrays import Array
@@ -26,9 +25,17 @@ from fivebar_sim.tasks import REASONS, Randomise, Task
 
 gl.settle()  # before dm_control loads OpenGL
 
-from dm_control.mujoco import Physics  # noqa: E402
-from dm_control.mujoco.wrapper import MjModel  # noqa: E402
-from dm_control.rl import control  # noqa: E402
+try:
+    from dm_control.mujoco import Physics
+    from dm_control.mujoco.wrapper import MjModel
+    from dm_control.rl import control
+    from dm_env import specs
+except ModuleNotFoundError as error:
+    raise ModuleNotFoundError(
+        f"fivebar_sim.environment needs dm-control ({error}): "
+        "pip install 'fivebar-sim[control]' with Python 3.11 or 3.12; it has no wheel for newer ones",
+        name=error.name,
+    ) from error
 
 
 class LegPhysics(Physics):

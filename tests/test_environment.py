@@ -11,6 +11,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+
+pytest.importorskip("dm_control", reason="dm-control has no wheel for this Python (3.13 and newer)")
+
 from dm_env import StepType, test_utils
 from env_runs import actions, played, scenario, task_of
 
