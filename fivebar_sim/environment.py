@@ -33,7 +33,7 @@ try:
 except ModuleNotFoundError as error:
     raise ModuleNotFoundError(
         f"fivebar_sim.environment needs dm-control ({error}): "
-        "pip install 'fivebar-sim[control]' with Python 3.11 or 3.12; it has no wheel for newer ones",
+        "pip install 'fivebar-sim[control]' on Python 3.11 or 3.12; newer ones have no wheel",
         name=error.name,
     ) from error
 
