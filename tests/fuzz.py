@@ -166,7 +166,6 @@ class Law(NamedTuple):
         @hypothesis.seed(seed)
         @settings(
             max_examples=examples,
-            deadline=None,
             database=None,
             print_blob=False,
             suppress_health_check=SLOW,

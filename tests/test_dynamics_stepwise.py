@@ -41,7 +41,7 @@ def open_rows(leg: FiveBar, rng: np.random.Generator, h: float, batch: tuple[int
 # law
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(
     frequency=st.floats(0.5, 4.0),
     payload=st.floats(0.0, 0.5),

@@ -106,7 +106,7 @@ def test_every_preset_is_tracked(leg: FiveBar, integrator: Integrator) -> None:
     assert tracking(leg, around_rest(leg), integrator) < bar * leg.size
 
 
-@settings(max_examples=12, deadline=None)
+@settings(max_examples=12)
 @given(
     lengths=st.tuples(*[st.floats(0.9, 1.1)] * 4),
     density=st.floats(200.0, 8000.0),

@@ -10,6 +10,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from hypothesis import HealthCheck, settings
 
 ROOT = Path(__file__).resolve().parents[1]
 FILES = sorted(
@@ -77,6 +78,17 @@ def imports(source: str) -> Iterator[str]:
             yield node.module.split(".")[0]
 
 
+def examples_set(source: str) -> set[str]:
+    """Return which of Hypothesis's settings a source sets anywhere, in whatever call."""
+    calls = (node for node in ast.walk(ast.parse(source)) if isinstance(node, ast.Call))
+    return {
+        str(keyword.arg)
+        for call in calls
+        if ast.unparse(call.func).split(".")[-1] == "settings"
+        for keyword in call.keywords
+    }
+
+
 def exporting() -> list[str]:
     """Return the modules of the package and of controllers that have an __all__."""
     modules = []
@@ -128,3 +140,24 @@ def test_scripts_and_tests_are_not_imported_by_what_ships() -> None:
 def test_every_export_exists(module: str) -> None:
     loaded = importlib.import_module(module)
     assert [each for each in loaded.__all__ if not hasattr(loaded, each)] == []
+
+
+def test_examples_have_no_deadline_and_repeat_unless_asked_for_others(
+    pytestconfig: pytest.Config,
+) -> None:
+    for profile in (settings(), settings.get_profile("random")):
+        assert profile.deadline is None
+        assert HealthCheck.too_slow in profile.suppress_health_check
+    asked = pytestconfig.getoption("--hypothesis-profile") or "repeatable"
+    assert settings().derandomize == (asked == "repeatable")
+    assert not settings.get_profile("random").derandomize
+    assert "--long) which=--hypothesis-profile=random" in (ROOT / "scripts" / "test").read_text()
+
+
+def test_no_test_has_its_own_deadline_or_draw() -> None:
+    ours = "@hypothesis.settings(max_examples=3, deadline=None)\ndef f(): ..."
+    assert examples_set(ours) == {"max_examples", "deadline"}
+    for path in FILES:
+        if path.name != "conftest.py":
+            own = examples_set(path.read_text(encoding="utf-8"))
+            assert not own & {"deadline", "derandomize"}, name(path)

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import ArrayLike
 
@@ -66,13 +66,9 @@ def same(found: Any, wanted: Any) -> None:
         assert value == near, key
 
 
-laws = settings(max_examples=100, derandomize=True, deadline=None)
-
-
 # law
 
 
-@laws
 @given(windows(), st.integers(-900, 25), st.booleans())
 def test_shares_have_no_unit(window: Window, power: int, mirrored: bool) -> None:
     torque, theta = window
@@ -87,7 +83,6 @@ def test_shares_have_no_unit(window: Window, power: int, mirrored: bool) -> None
         assert more["work"][motor]["positive"] == scale * once["work"][motor][turn]
 
 
-@laws
 @given(windows())
 def test_nothing_prefers_a_motor(window: Window) -> None:
     torque, theta = window
@@ -95,7 +90,6 @@ def test_nothing_prefers_a_motor(window: Window) -> None:
     same(load.measure(-torque, -theta, H), load.measure(*window, H))
 
 
-@laws
 @given(windows(least=2), st.data())
 def test_work_adds_over_split_windows(window: Window, data: st.DataObject) -> None:
     torque, theta = window
@@ -110,7 +104,6 @@ def test_work_adds_over_split_windows(window: Window, data: st.DataObject) -> No
     assert len(torque) * both["fraction"] == pytest.approx(steps, abs=1e-12)
 
 
-@laws
 @given(windows(), st.data())
 def test_stance_and_its_complement_make_the_whole(window: Window, data: st.DataObject) -> None:
     rows = len(window[0])
@@ -125,7 +118,6 @@ def test_stance_and_its_complement_make_the_whole(window: Window, data: st.DataO
     same(load.measure(*window, H, stance=np.ones(rows, dtype=bool))["stance"], whole)
 
 
-@laws
 @given(windows(), st.integers(1, 9), st.data())
 def test_phase_bins_are_stances(window: Window, bins: int, data: st.DataObject) -> None:
     rows = len(window[0])
@@ -141,7 +133,6 @@ def test_phase_bins_are_stances(window: Window, bins: int, data: st.DataObject) 
 # oracle
 
 
-@laws
 @given(windows())
 def test_a_plain_loop_measures_the_same(window: Window) -> None:
     torque, theta = window

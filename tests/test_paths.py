@@ -11,7 +11,7 @@ from typing import Any
 import msgspec
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from fivebar_sim.errors import ArgumentError
@@ -71,7 +71,6 @@ def test_ramp_is_never_faster_than_the_path(ramp: float, tau: float) -> None:
 
 
 @pytest.mark.parametrize("name", [*SHAPES, "csv-periodic"])
-@settings(deadline=None)  # the first call imports scipy
 @given(time=st.floats(RAMP, 10.0), cycles=st.integers(1, 20))
 def test_paths_repeat_with_their_period(
     paths: dict[str, FootPath], name: str, time: float, cycles: int
