@@ -39,13 +39,12 @@ timeout_constant = 3.0
 timeout_multiplier = 2.0
 """
 SLOW = (
-    "tests/test_kinematics.py::test_array_is_fifteen_times_faster_than_a_loop_and_equal",
     "tests/test_kinematics.py::test_forward_of_inverse_is_identity",
     "tests/test_half_angle.py::test_two_routes_agree_over_a_million_points",
     "tests/test_dynamics_motion.py::test_springs_keep_the_energy_for_ten_seconds",
     "tests/test_dynamics_motion.py::test_motion_into_a_singular_pose_says_when",
 )
-"""Tests that are not asked: of speed, or of more than some seconds."""
+"""Tests that are not asked: those of more than some seconds."""
 
 
 class Room(NamedTuple):

@@ -118,19 +118,32 @@ def test_trouble_while_sending_reaches_the_caller(
 def test_who_speaks_no_grpc_is_no_viewer(answer: bytes, monkeypatch: pytest.MonkeyPatch) -> None:
     """One that says nothing would keep a run waiting for ever; one that errs would lose it."""
     monkeypatch.setattr(live, "ANSWER", 0.3)
+    judged = threading.Event()
     with socket.create_server(("127.0.0.1", 0)) as server:
 
         def serve() -> None:
             connection = server.accept()[0]
             connection.sendall(answer)
-            time.sleep(0.6)
+            judged.wait()  # an end of the connection would be an answer, too
             connection.close()
 
         thread = threading.Thread(target=serve)
         thread.start()
         with pytest.raises(ConfigError, match=r"^no Rerun viewer listens at 127\.0\.0\.1:\d+: "):
             live.checked(f"127.0.0.1:{server.getsockname()[1]}")
+        judged.set()
         thread.join()
+
+
+def wait_for(viewer: subprocess.Popen[bytes], address: str) -> None:
+    """Wait until a viewer listens, however long it takes to start."""
+    while True:
+        try:
+            live.checked(address)
+            return
+        except ConfigError:
+            assert viewer.poll() is None
+            time.sleep(0.1)
 
 
 def test_viewer_that_is_closed_does_not_harm_the_run(tmp_path: Path) -> None:
@@ -145,14 +158,7 @@ def test_viewer_that_is_closed_does_not_harm_the_run(tmp_path: Path) -> None:
         stderr=subprocess.DEVNULL,
     )
     try:
-        deadline = time.monotonic() + 20.0
-        while True:
-            try:
-                live.checked(address)
-                break
-            except ConfigError:
-                assert time.monotonic() < deadline
-                time.sleep(0.1)
+        wait_for(viewer, address)
         plan = rollout.plan(Scenario.load("classic-ellipse", ["duration=0.9"]))
         with live.streaming(plan, address) as watch:
             viewer.kill()
