@@ -17,7 +17,7 @@ from fivebar_sim import report, rollout, run_directory, stored_run, tables
 from fivebar_sim.console import SHOWN, bounds, shown
 from fivebar_sim.errors import ArgumentError, RunDirectoryError
 from fivebar_sim.metrics import judge, look_up
-from fivebar_sim.report import comparison
+from fivebar_sim.report import comparison, look, single
 from fivebar_sim.scenario import Scenario
 
 AIR = ["foot-path", "leg-moments", "tracking-error", "load-share", "torque", "loop-gap"]
@@ -192,7 +192,10 @@ def test_a_run_directory_with_its_report_stays_one(runs: dict[str, Path], tmp_pa
     assert not (run / "report.html").exists()
 
 
-def test_command_says_where(runs: dict[str, Path], shell: Shell) -> None:
+def test_command_says_where(
+    runs: dict[str, Path], shell: Shell, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(look, "png", lambda figure: b"")  # pictures: test_same_runs_same_bytes
     run = shutil.copytree(runs["limited"], shell.folder / "mine")
     assert shell("report", "mine") == (0, "report of 1 run in mine/report.html\n", "")
     assert (run / "report.html").stat().st_mode & 0o777 == 0o644
@@ -207,7 +210,11 @@ def test_command_says_where(runs: dict[str, Path], shell: Shell) -> None:
     assert report.place_of([run, run]) == Path("comparison.html")
 
 
-def test_refusals_are_one_line(runs: dict[str, Path], shell: Shell) -> None:
+def test_refusals_are_one_line(
+    runs: dict[str, Path], shell: Shell, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(single, "page", lambda run, drawn: "")  # what nobody sees is not drawn
+    monkeypatch.setattr(look, "png", lambda figure: b"")
     shutil.copytree(runs["limited"], shell.folder / "mine")
     (shell.folder / "d.html").mkdir()
     (shell.folder / "file").write_text("x")
