@@ -5,13 +5,10 @@ from __future__ import annotations
 import importlib
 import io
 import os
-import signal
 import sys
-import threading
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 
-from fivebar_sim import __version__, memory
+from fivebar_sim import __version__, memory, signals
 from fivebar_sim.commands.status import FAILED, INTERRUPTED, UNREAD, WRONG, say
 from fivebar_sim.errors import DivergedError, FiveBarError
 
@@ -27,8 +24,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(errors="backslashreplace")  # any name, in any terminal's encoding
     try:
-        with _terminable():
-            status = _dispatch(args)
+        with signals.heard():
+            status = _call(args)
         if sys.stdout:
             sys.stdout.flush()
         return status
@@ -50,35 +47,6 @@ def main(argv: Sequence[str] | None = None) -> int:
     except MemoryError as error:
         say(f"not enough memory: {error}")
         return WRONG
-
-
-@contextmanager
-def _terminable() -> Iterator[None]:
-    """Let SIGTERM end the program as Ctrl-C does, tidied up, with its own exit status."""
-    ours = threading.current_thread() is threading.main_thread()
-    if not ours or signal.getsignal(signal.SIGTERM) != signal.SIG_DFL:
-        yield
-        return
-
-    def end(number: int, frame: object) -> None:
-        raise SystemExit(128 + number)
-
-    signal.signal(signal.SIGTERM, end)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGTERM, signal.SIG_DFL)
-
-
-def _dispatch(args: list[str]) -> int:
-    """Call what the arguments say; a signal that ends an import ends the program as any other."""
-    try:
-        return _call(args)
-    except ImportError as error:
-        cause: BaseException | None = error
-        while cause and not isinstance(cause, (KeyboardInterrupt, SystemExit)):
-            cause = cause.__cause__  # modules in C++ raise their own error where they are stopped
-        raise cause or error from None
 
 
 def _call(args: list[str]) -> int:

@@ -106,6 +106,18 @@ def session() -> Iterator[None]:
 
 def _encoded(runs: Sequence[Run], names: list[str]) -> bytes:
     """Return the bytes of the recording."""
+    stream = started(" + ".join(names))
+    output = stream.binary_stream()
+    try:
+        _send(stream, runs, names)
+    finally:
+        data = output.read()  # also where a signal ends it: Rerun warns of bytes that nobody reads
+    assert data is not None
+    return data
+
+
+def _send(stream: rr.RecordingStream, runs: Sequence[Run], names: list[str]) -> None:
+    """Send the layout, the text, the room and all runs."""
     import rerun as rr
 
     shown = looks(names)
@@ -113,17 +125,11 @@ def _encoded(runs: Sequence[Run], names: list[str]) -> bytes:
     plots = [list(series(run.scenario, run.record)) for run in runs]
     room = stage([run.scenario.leg for run in runs], moved)
     text = summary(names, [run.metrics for run in runs], [run.scenario.limits for run in runs])
-
-    stream = started(" + ".join(names))
-    output = stream.binary_stream()
     layout.send(stream, layout.contents(room, shown, plots))
     stream.log(layout.SUMMARY, rr.TextDocument(text, media_type="text/markdown"), static=True)
     log_room(stream, room)
     for run, look, poses, lines in zip(runs, shown, moved, plots, strict=True):
         _send_run(stream, run, look, poses, lines, room)
-    data = output.read()
-    assert data is not None
-    return data
 
 
 def started(name: str) -> rr.RecordingStream:

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import signal
+import subprocess
+from collections.abc import Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import pytest
 
@@ -20,6 +23,25 @@ frequency = 4.0
 ramp = 0.1
 """
 CSV = "time_s,x_mm,z_mm\n0,0,-80\n0.2,10,-75\n0.4,0,-70\n0.6,-10,-75\n"
+
+
+def started(command: Sequence[str], interrupt: Any = None, **more: Any) -> subprocess.Popen[Any]:
+    """Start a program as a terminal does, whatever the tests were started with.
+
+    What is started behind `&` in a script ignores Ctrl-C, and so do its children: a handler of this
+    process is not inherited, but that a signal is ignored is.
+
+    Args:
+        command: The program and its arguments.
+        interrupt: Handler of SIGINT meanwhile; None is Python's, SIG_IGN starts it ignoring that.
+        more: As of Popen; stdout and stderr are pipes.
+    """
+    before = signal.signal(signal.SIGINT, interrupt or signal.default_int_handler)
+    pipes: dict[str, Any] = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
+    try:
+        return subprocess.Popen(command, **(pipes | more))
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
 class Said(NamedTuple):

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import os
-import signal
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import pytest
@@ -75,27 +73,3 @@ print("slow:", sorted(slow & set(sys.modules)))
 """
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.endswith("slow: []\n")
-
-
-@pytest.mark.skipif(os.name == "nt", reason="Windows sends no signals to one process")
-@pytest.mark.parametrize(
-    ("sent", "status", "said"),
-    [(signal.SIGINT, 130, b"fivebar: interrupted\n"), (signal.SIGTERM, 143, b"")],
-)
-def test_signal_ends_the_program_and_leaves_nothing(
-    folder: Path, sent: signal.Signals, status: int, said: bytes
-) -> None:
-    code = "from fivebar_sim.cli import main; print(1, flush=True); raise SystemExit(main())"
-    before = names(folder)
-    long = ["run", "short.toml", "--set", "duration=1000", "--quiet"]
-    with subprocess.Popen(
-        [sys.executable, "-c", code, *long], stdout=subprocess.PIPE, stderr=subprocess.PIPE
-    ) as process:
-        assert process.stdout is not None
-        process.stdout.readline()
-        time.sleep(1.0)  # a run of this length takes more than five times that
-        process.send_signal(sent)
-        assert process.stderr is not None
-        assert process.stderr.read() == said
-    assert process.returncode == status
-    assert names(folder) == before

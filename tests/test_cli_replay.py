@@ -13,7 +13,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from shell import Shell
+from shell import Shell, started
 
 from fivebar_sim import recording_file
 
@@ -93,10 +93,8 @@ def test_web_serves_until_it_is_ended_and_leaves_nothing(
 ) -> None:
     (tmp_path / "temporary").mkdir()
     before = recorded.names()
-    server = subprocess.Popen(
+    server = started(
         [sys.executable, "-c", PROGRAM, "replay", "mine", "other", "--web"],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
         text=True,
         env=os.environ | {"TMPDIR": str(tmp_path / "temporary")},
     )

@@ -14,7 +14,7 @@ import pytest
 import rerun
 from shell import Shell
 
-from fivebar_sim import cli, input_file, memory, recording_file, rollout, run_directory, scenario
+from fivebar_sim import input_file, memory, recording_file, rollout, run_directory, scenario
 from fivebar_sim.commands import status
 
 resource = pytest.importorskip("resource", reason="this system limits no process")
@@ -226,34 +226,6 @@ def test_a_line_is_short_and_obeyed_by_no_terminal() -> None:
     assert long.startswith("aaa")
     assert long.endswith("aaaend")
     assert len(long) < 610
-
-
-@pytest.mark.parametrize(
-    ("raised", "came", "said"),
-    [(KeyboardInterrupt(), 130, "fivebar: interrupted\n"), (SystemExit(143), 143, "")],
-)
-def test_a_signal_that_an_import_swallowed_ends_the_program(
-    shell: Shell, monkeypatch: pytest.MonkeyPatch, raised: BaseException, came: int, said: str
-) -> None:
-    def stopped(args: list[str]) -> NoReturn:  # as pybind11's modules do it
-        try:
-            try:
-                raise raised
-            except BaseException as first:
-                raise ImportError("initialization failed") from first
-        except ImportError as second:
-            raise ImportError("initialization failed") from second
-
-    monkeypatch.setattr(cli, "_call", stopped)
-    shell.capture.readouterr()
-    try:
-        ended = cli.main(["run"])
-    except SystemExit as end:
-        ended = end.code
-    assert (ended, shell.capture.readouterr().err) == (came, said)
-    monkeypatch.setattr(cli, "_call", lambda args: __import__("no_such_module"))
-    with pytest.raises(ModuleNotFoundError):
-        cli.main(["run"])
 
 
 def test_everything_slow_is_imported_within_main() -> None:

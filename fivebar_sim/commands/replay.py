@@ -46,7 +46,7 @@ def _show(run_dirs: tuple[Path, ...]) -> int:
 
 def _serve(run_dirs: tuple[Path, ...], port: int) -> int:
     """Serve the recording to browsers, until Ctrl-C, which is the way to end it: status 0."""
-    from fivebar_sim import recording_file, web
+    from fivebar_sim import recording_file, signals, web
 
     title = " + ".join(recording_file.called(run_dirs))
     try:
@@ -56,5 +56,5 @@ def _serve(run_dirs: tuple[Path, ...], port: int) -> int:
             print(f"{title}: {server.url} (Ctrl-C ends it)", flush=True)  # noqa: T201
             server.serve_forever()
     except KeyboardInterrupt:
-        pass
+        signals.answered()
     return 0

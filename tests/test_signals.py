@@ -1,0 +1,185 @@
+"""Ctrl-C and SIGTERM: they end the program whenever they come, and leave nothing."""
+
+from __future__ import annotations
+
+import os
+import random
+import signal
+import subprocess
+import sys
+import time
+from collections import Counter
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from pathlib import Path
+
+import pytest
+from shell import ELLIPSE, Shell, started
+
+from fivebar_sim import cli, signals, stored_run
+from fivebar_sim.errors import ConfigError
+
+pytestmark = pytest.mark.skipif(os.name == "nt", reason="Windows sends no signals to one process")
+
+FIVEBAR = str(Path(sys.executable).with_name("fivebar"))
+TOLD = """
+import signal, sys
+from fivebar_sim import cli, simulate
+advance = simulate.Legs.advance
+def told(*args):
+    {then}
+    simulate.Legs.advance = advance
+    return advance(*args)
+simulate.Legs.advance = told
+sys.exit(cli.main())
+"""
+"""The program, that does something when it begins to simulate."""
+ENDS = [(signal.SIGINT, 130, "fivebar: interrupted\n"), (signal.SIGTERM, 143, "")]
+LONG = ["run", "short.toml", "--quiet", "--set", "duration=1000", "--out", "mine"]
+
+
+@pytest.fixture(autouse=True)
+def usual() -> Iterator[None]:
+    """Have Python's own handlers, however the tests were started."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
+@pytest.mark.parametrize(("sent", "status", "said"), ENDS)
+def test_signal_ends_the_program_and_leaves_nothing(
+    shell: Shell, sent: signal.Signals, status: int, said: str
+) -> None:
+    before = shell.names()
+    code = TOLD.format(then="print('begun', flush=True)")
+    with started([sys.executable, "-c", code, *LONG], text=True) as process:
+        assert process.stdout is not None
+        assert process.stdout.readline() == "begun\n"
+        process.send_signal(sent)
+        assert process.communicate()[1] == said
+    assert process.returncode == status
+    assert shell.names() == before
+
+
+def test_ignored_interrupt_stays_ignored_and_the_other_signal_does_not(shell: Shell) -> None:
+    for sent, status in ((signal.SIGINT, 0), (signal.SIGTERM, 143)):
+        code = TOLD.format(then=f"signal.raise_signal({int(sent)})")
+        command = [sys.executable, "-c", code, "run", "short.toml", "--quiet", "--out", sent.name]
+        with started(command, signal.SIG_IGN) as process:
+            assert process.communicate() == (b"", b"")
+        assert process.returncode == status
+        assert Path(sent.name).exists() == (status == 0)
+
+
+def dropped_by_the_interpreter(send: Callable[[], None]) -> None:
+    class Goes:
+        def __del__(self) -> None:
+            send()
+
+    Goes()
+
+
+def dropped_by_code(send: Callable[[], None]) -> None:
+    with suppress(BaseException):
+        send()
+
+
+def made_an_import_error(send: Callable[[], None]) -> None:
+    try:
+        send()
+    except BaseException as first:
+        raise ImportError("initialization failed") from first
+
+
+def made_bad_input(send: Callable[[], None]) -> None:
+    try:
+        send()
+    except BaseException:
+        raise ConfigError("it cannot be read") from None
+
+
+@pytest.mark.parametrize(("sent", "status", "said"), ENDS)
+@pytest.mark.parametrize(
+    "lose", [dropped_by_the_interpreter, dropped_by_code, made_an_import_error, made_bad_input]
+)
+def test_signal_whose_exception_is_lost_ends_the_program_all_the_same(
+    shell: Shell,
+    monkeypatch: pytest.MonkeyPatch,
+    lose: Callable[[Callable[[], None]], None],
+    sent: signal.Signals,
+    status: int,
+    said: str,
+) -> None:
+    def call(args: list[str]) -> int:
+        lose(lambda: signal.raise_signal(sent))
+        return 0
+
+    monkeypatch.setattr(cli, "_call", call)
+    shell.capture.readouterr()
+    assert _status() == status
+    assert shell.capture.readouterr() == ("", said)
+    assert signal.getsignal(signal.SIGTERM) == signal.SIG_DFL
+    assert signal.getsignal(signal.SIGINT) == signal.default_int_handler
+
+
+def test_lost_signal_ends_a_long_run_early(shell: Shell, monkeypatch: pytest.MonkeyPatch) -> None:
+    def call(args: list[str]) -> int:
+        dropped_by_code(lambda: signal.raise_signal(signal.SIGTERM))
+        for _ in range(10_000):  # in pieces, since what raises again wakes nobody up
+            time.sleep(0.01)
+        raise AssertionError("it was never raised again")
+
+    monkeypatch.setattr(cli, "_call", call)
+    assert _status() == 143
+
+
+def test_tidying_up_is_not_interrupted(shell: Shell, monkeypatch: pytest.MonkeyPatch) -> None:
+    done = []
+
+    def call(args: list[str]) -> int:
+        try:
+            signal.raise_signal(signal.SIGTERM)
+        finally:
+            signal.raise_signal(signal.SIGINT)  # an impatient one
+            for _ in range(30):
+                time.sleep(0.1 * signals.PATIENCE)
+            done.append("tidy")
+        return 0
+
+    monkeypatch.setattr(cli, "_call", call)
+    assert _status() == 143
+    assert done == ["tidy"]
+
+
+def _status() -> object:
+    """Return how the program ends."""
+    try:
+        return cli.main(["run"])
+    except SystemExit as end:
+        return end.code
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(("sent", "status", "said"), ENDS)
+def test_signal_at_any_moment_ends_the_program(
+    tmp_path: Path, sent: signal.Signals, status: int, said: str
+) -> None:
+    """Status and output, at 75 moments of a run: after `main` has begun, and until it has ended."""
+    (tmp_path / "short.toml").write_text(ELLIPSE, encoding="utf-8")
+    command = [FIVEBAR, "run", "short.toml", "--quiet", "--out", "mine"]
+    begun, rng, came = time.monotonic(), random.Random(1), Counter[tuple[int, bytes, bool]]()
+    subprocess.run(command, cwd=tmp_path, check=True)
+    takes = time.monotonic() - begun
+    for number in range(75):
+        place = tmp_path / f"out{number}"
+        with started([*command[:-1], place.name], cwd=tmp_path) as process:
+            time.sleep(rng.uniform(0.1, 1.1) * takes)
+            process.send_signal(sent)
+            err = process.communicate()[1]
+        if place.exists():
+            stored_run.read(place)
+        came[process.returncode, err, place.exists()] += 1
+    assert not list(tmp_path.glob(".*"))
+    # a whole run is there if it had ended: nothing to end, or nothing but the interpreter
+    assert set(came) <= {(status, said.encode(), False), (0, b"", True), (-sent, b"", True)}
+    assert came[status, said.encode(), False] > 30
