@@ -14,13 +14,14 @@ from typing import get_args
 import mujoco
 import numpy as np
 
-from fivebar_sim import kinematics, loop, resources
+from fivebar_sim import kinematics, resources
 from fivebar_sim.arrays import Array
 from fivebar_sim.errors import ArgumentError, GeometryError, unknown
 from fivebar_sim.geometry import LONGEST, FiveBar, Link, combined
+from fivebar_sim.integrator import CONNECT, Integrator, solref
 from fivebar_sim.kinematics.stops import stops_at_C
 from fivebar_sim.scenes import Ground, Payload, Scene, Treadmill, named
-from fivebar_sim.servo import Drive, Integrator, Servo
+from fivebar_sim.servo import Drive, Servo
 
 JOINTS = ("A", "B", "E", "D")
 """The joints in the order of qpos, and of every (..., 4) array of joint angles.
@@ -270,6 +271,6 @@ def _drive(spec: mujoco.MjSpec, servo: Servo | None, drive: Drive) -> None:
 def _close(spec: mujoco.MjSpec, integrator: Integrator, q: Array) -> None:
     """Set the loop's stiffness, and the stops of the angle at C around the rest pose's branch."""
     connect = spec.equality("C")
-    connect.solref = loop.solref(integrator, spec.option.timestep)
-    connect.solimp[:3] = loop.CONNECT[integrator][1]
+    connect.solref = solref(integrator, spec.option.timestep)
+    connect.solimp[:3] = CONNECT[integrator][1]
     spec.tendon("C_angle").range = stops_at_C(q)

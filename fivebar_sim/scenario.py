@@ -17,12 +17,12 @@ from fivebar_sim.errors import ArgumentError, ConfigError, unknown
 from fivebar_sim.forces import FootForce
 from fivebar_sim.geometry import FiveBar
 from fivebar_sim.guards import Guards
+from fivebar_sim.integrator import Sim
 from fivebar_sim.metrics import GROUND_KEYS, LIMIT_KEYS
 from fivebar_sim.paths import FootPath, Gait
 from fivebar_sim.scenes import Air, Ground, Payload, Scene, Treadmill
 from fivebar_sim.sensors import Sensors
 from fivebar_sim.servo import Servo
-from fivebar_sim.sim import Sim
 from fivebar_sim.tables import Table
 
 MOST_STEPS = 5_000_000

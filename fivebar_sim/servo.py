@@ -17,8 +17,7 @@ from fivebar_sim import resources, tables
 from fivebar_sim.arrays import Array, Bools
 from fivebar_sim.checks import check_number, check_step
 from fivebar_sim.errors import ArgumentError, ConfigError, unknown
-
-Integrator = Literal["discrete", "implicitfast"]
+from fivebar_sim.integrator import Integrator
 
 Drive = Literal["position", "torque"]
 """What a command is: an angle for the servo [rad], or a torque for the bare motor [N m]."""

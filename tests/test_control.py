@@ -16,8 +16,8 @@ from controllers.servo import Servo
 from fivebar_sim import control, motion, rollout
 from fivebar_sim.arrays import Array
 from fivebar_sim.errors import ConfigError
+from fivebar_sim.integrator import Integrator
 from fivebar_sim.scenario import Scenario
-from fivebar_sim.servo import Integrator
 
 Plug = Callable[..., None]
 

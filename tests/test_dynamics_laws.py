@@ -11,10 +11,11 @@ import numpy as np
 import pytest
 from poses import sample
 
-from fivebar_sim import dynamics, kinematics, loop, model, motion
+from fivebar_sim import dynamics, kinematics, model, motion
 from fivebar_sim.arrays import Array
 from fivebar_sim.errors import ArgumentError, DivergedError
 from fivebar_sim.geometry import FiveBar
+from fivebar_sim.integrator import pull
 from fivebar_sim.paths import Ellipse
 
 HEAVY = FiveBar(  # nothing equal, nothing in the middle of a link
@@ -145,7 +146,7 @@ def test_gap_of_a_soft_loop_obeys_its_equation(leg: FiveBar, damping: float) -> 
     """With MuJoCo's M and site Jacobians: gap_ddot(alpha + h M^-1 D alpha) = -b gap_dot - k gap."""
     q = dynamics.soft_loop(leg, planned(leg), H, damping)
     rate = np.diff(q, axis=0, prepend=q[:1]) / H  # of the step that ends in each row
-    k, b = loop.pull(H)
+    k, b = pull(H)
     mj = model.build(leg)
     data, M, D = mujoco.MjData(mj), np.zeros((4, 4)), np.diag([damping, 0.0, damping, 0.0])
     sites = [mj.site(name).id for name in ("C_left", "C_right")]

@@ -13,10 +13,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from poses import BATCHES, RIGID
 
-from fivebar_sim import dynamics, kinematics, loop, model, motion, resources
+from fivebar_sim import dynamics, kinematics, model, motion, resources
 from fivebar_sim.arrays import Array
 from fivebar_sim.errors import ArgumentError, DivergedError, SingularError
 from fivebar_sim.geometry import FiveBar
+from fivebar_sim.integrator import pull
 from fivebar_sim.motion import Motion
 from fivebar_sim.paths import Ellipse
 from fivebar_sim.servo import Servo
@@ -121,7 +122,7 @@ def test_pull_of_the_loop_is_mujocos(h: float) -> None:
     data.qpos[3] += 1e-3
     data.qvel[:] = 0.1, -0.2, 0.3, 0.4
     mujoco.mj_forward(mj, data)
-    k, b = loop.pull(h)
+    k, b = pull(h)
     np.testing.assert_allclose(data.efc_KBIP[:3, 0] * data.efc_KBIP[:3, 2], k, rtol=1e-12)
     np.testing.assert_allclose(data.efc_KBIP[:3, 1], b, rtol=1e-12)
 

@@ -41,7 +41,7 @@ PURE = (
     "ground",
     "energy",
     "guards",
-    "sim",
+    "integrator",
     "scenes",
     "sensors",
     "servo",
@@ -49,7 +49,6 @@ PURE = (
     "tasks",
     "episodes",
     "stacked",
-    "loop",
 )
 HEAVY = {"mujoco", "rerun", "matplotlib", "scipy"}
 

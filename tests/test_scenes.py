@@ -13,10 +13,11 @@ from mujoco.batch import Batch
 from fivebar_sim import dynamics, kinematics, model, resources, rollout, scenes
 from fivebar_sim.errors import ArgumentError, ConfigError, GeometryError
 from fivebar_sim.geometry import FiveBar
+from fivebar_sim.integrator import Integrator
 from fivebar_sim.rollout import Result
 from fivebar_sim.scenario import Scenario
 from fivebar_sim.scenes import Air, Ground, Payload, Rail, Scene, Treadmill
-from fivebar_sim.servo import Integrator, Servo
+from fivebar_sim.servo import Servo
 
 FILES = sorted((resources.folder("models") / "scenes").glob("*.xml"))
 INTEGRATORS: tuple[Integrator, ...] = get_args(Integrator)

@@ -16,7 +16,7 @@ from validation_air import Key
 
 from fivebar_sim import rollout
 from fivebar_sim.geometry import FiveBar
-from fivebar_sim.servo import Integrator
+from fivebar_sim.integrator import Integrator
 
 STEPS = (1e-3, 5e-4, 2.5e-4)
 EACH = pytest.mark.parametrize("integrator", air.INTEGRATORS)

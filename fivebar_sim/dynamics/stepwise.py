@@ -14,13 +14,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fivebar_sim import loop
 from fivebar_sim.arrays import Array, as_pairs, as_vectors, at, finite, first_index
 from fivebar_sim.checks import check_number
 from fivebar_sim.dynamics.chain import Chain, Four, Pose, Vector, cross
 from fivebar_sim.dynamics.motion import TURN_MAX
 from fivebar_sim.errors import ArgumentError, DivergedError, SingularError
 from fivebar_sim.geometry import FiveBar
+from fivebar_sim.integrator import pull
 from fivebar_sim.kinematics.rates import SINGULAR
 
 
@@ -84,7 +84,7 @@ def soft_loop(
 
         alpha' = M^-1 (M + h D) alpha,   so   gap_ddot(alpha') = -b gap_dot - k gap
 
-    with k and b of `loop.pull`, gap_ddot with its centripetal part. A moving leg therefore opens
+    with k and b of `integrator.pull`, gap_ddot with its centripetal part. A moving leg so opens
     the loop. The foot sits on L2, so L1 and L2 follow q to the last bit and the foot its path;
     the equation leaves no choice for L3 and L4, and is solved for them step by step. With
 
@@ -182,7 +182,7 @@ def _in_line(joints: str, sine: float, index: tuple[int, ...]) -> SingularError:
 
 def _pulled(chain: Chain, steps: _Steps, h: float, damping: float) -> Array:
     """Return P_left + k (A - E) of every step [m/s^2], (N, 2)."""
-    k, b = loop.pull(h)
+    k, b = pull(h)
     p = _pose(chain, steps.psi)
     (w1, w2, _, _), (a1, a2, _, _) = steps.w, steps.alpha
     H12, _ = chain.couplings(p)
@@ -202,7 +202,7 @@ def _pulled(chain: Chain, steps: _Steps, h: float, damping: float) -> Array:
 
 def _trailing(chain: Chain, pulled: Array, start: Vector, h: float, damping: float) -> Array:
     """Return (psi_3, psi_4) that trail behind what pulls them [rad], (N + 1, 2)."""
-    k, b = loop.pull(h)
+    k, b = pull(h)
     L3, L4 = chain.leg.L3, chain.leg.L4
     (psi3, psi4), w3, w4 = start, 0.0, 0.0
     rows = [start]

@@ -1,14 +1,38 @@
-"""How stiffly MuJoCo's soft constraint closes the loop at C, by integrator."""
+"""MuJoCo's integrator: its name, the scenario's table [sim], and how stiffly it closes the loop."""
 
 from __future__ import annotations
 
-from fivebar_sim.servo import Integrator
+from typing import Literal
+
+import msgspec
+
+from fivebar_sim.checks import check_number
+
+Integrator = Literal["discrete", "implicitfast"]
 
 CONNECT = {
     "discrete": ((1e-4, 1.0), (0.95, 0.99, 0.001)),
     "implicitfast": ((2.0, 1.0), (0.9999, 0.9999, 0.001)),  # time constant in timesteps
 }
 """solref and solimp of the loop's closure, by integrator; measured in docs/model.md."""
+
+
+class Sim(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """How the run is simulated.
+
+    Attributes:
+        timestep: h [s].
+        integrator: MuJoCo's integrator, "discrete" or "implicitfast".
+        seed: Of everything random in a run, as the sensors' noise.
+    """
+
+    timestep: float = 0.001
+    integrator: Integrator = "discrete"
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        check_number("timestep", self.timestep, "s", low=0.0, strict=True)
+        check_number("seed", self.seed, "", low=0)
 
 
 def solref(integrator: Integrator, timestep: float) -> tuple[float, float]:
