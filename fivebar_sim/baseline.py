@@ -28,38 +28,13 @@ from typing import Any
 import msgspec
 
 from fivebar_sim import input_file, resources, tables, whole_file
+from fivebar_sim.catalogue import ABSOLUTE
 from fivebar_sim.checks import check_number
 from fivebar_sim.errors import ConfigError
-from fivebar_sim.metrics import look_up
+from fivebar_sim.limits import look_up
 
 RELATIVE = 0.005
 """By what part of its recorded value a metric may move."""
-
-ABSOLUTE = {
-    "tracking.rms": 1e-9,  # [m]
-    "tracking.max": 1e-9,
-    "closure.rms": 1e-9,
-    "closure.max": 1e-9,
-    "load.torque_rms.A": 1e-6,  # [N m]
-    "load.torque_rms.E": 1e-6,
-    "load.torque_peak.A": 1e-6,
-    "load.torque_peak.E": 1e-6,
-    "load.share_A": 0.002,
-    "load.thermal_share_A": 0.002,
-    "load.saturated.A": 0.002,
-    "load.saturated.E": 0.002,
-    "ground.force_max.x": 1e-3,  # [N]
-    "ground.force_max.z": 1e-3,
-    "ground.stance_share": 0.002,
-    "ground.slip": 1e-6,  # [m]
-    "ground.foot_height_max": 1e-6,
-    "ground.flight_max": 0.002,  # [s]
-}
-"""The metrics of a baseline, and by how much more each may move, in its own unit."""
-
-LESS_IS_BETTER = ("tracking", "closure", "load.torque_peak", "load.saturated", "ground.slip")
-"""Metrics that fail only when they grow. Any other fails when it moves: less torque over a whole
-run, or another share of it, is not what the leg needs for its path, until someone says so."""
 
 SAID = ("mujoco", "platform", "integrator", "timestep", "seed")
 """What of a run's provenance a baseline records."""

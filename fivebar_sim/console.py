@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
@@ -13,88 +12,15 @@ from rich.measure import Measurement
 from rich.table import Table
 
 from fivebar_sim import guards
-from fivebar_sim.metrics import Limit, look_up
+from fivebar_sim.catalogue import DETAILS, SHOWN, shown
+from fivebar_sim.limits import bounds, look_up
 
 if TYPE_CHECKING:
     from fivebar_sim.regression import Checked, Row
     from fivebar_sim.rollout import Result
 
-SHOWN = {
-    "tracking.rms": ("tracking RMS", 1e3, "mm"),
-    "tracking.max": ("tracking max", 1e3, "mm"),
-    "closure.rms": ("loop gap RMS", 1e6, "um"),
-    "closure.max": ("loop gap max", 1e6, "um"),
-    "load.torque_rms.A": ("torque A RMS", 1e3, "mN m"),
-    "load.torque_rms.E": ("torque E RMS", 1e3, "mN m"),
-    "load.torque_peak.A": ("torque A peak", 1e3, "mN m"),
-    "load.torque_peak.E": ("torque E peak", 1e3, "mN m"),
-    "load.share_A": ("load share A", 1e2, "%"),
-    "load.thermal_share_A": ("thermal share A", 1e2, "%"),
-    "load.peak_ratio": ("peak torque ratio", 1.0, ""),
-    "load.rms_ratio": ("torque RMS ratio", 1.0, ""),
-    "load.work.A.positive": ("work A given", 1e3, "mJ"),
-    "load.work.A.negative": ("work A taken", 1e3, "mJ"),
-    "load.work.A.net": ("work A net", 1e3, "mJ"),
-    "load.work.E.positive": ("work E given", 1e3, "mJ"),
-    "load.work.E.negative": ("work E taken", 1e3, "mJ"),
-    "load.work.E.net": ("work E net", 1e3, "mJ"),
-    "load.opposing.fraction": ("motors opposed", 1e2, "%"),
-    "load.opposing.energy": ("energy motor to motor", 1e3, "mJ"),
-    "load.saturated.A": ("motor A saturated", 1e2, "%"),
-    "load.saturated.E": ("motor E saturated", 1e2, "%"),
-    "ground.force_max.x": ("ground force x max", 1.0, "N"),
-    "ground.force_max.z": ("ground force z max", 1.0, "N"),
-    "ground.stance_share": ("time in stance", 1e2, "%"),
-    "ground.slip": ("slip in stance", 1e3, "mm"),
-    "ground.foot_height_max": ("foot height max", 1e3, "mm"),
-    "ground.flight_max": ("longest flight", 1e3, "ms"),
-    "energy.motor": ("work of the motors", 1e3, "mJ"),
-    "energy.force": ("work of the pushes", 1e3, "mJ"),
-    "energy.ground": ("work of the ground", 1e3, "mJ"),
-    "energy.constraints": ("work of loop, gears, ends", 1e3, "mJ"),
-    "energy.step": ("given by the steps", 1e3, "mJ"),
-    "energy.kinetic": ("kinetic energy gained", 1e3, "mJ"),
-    "energy.potential": ("potential energy gained", 1e3, "mJ"),
-    "energy.turnover": ("energy turned over", 1e3, "mJ"),
-    "energy.imbalance": ("energy imbalance", 1e2, "%"),
-    "branch.flips": ("branch flips", 1.0, ""),
-    "warnings": ("MuJoCo warnings", 1.0, ""),
-}
-"""What a metric is called, the factor from SI to the shown unit, and that unit."""
-
-DETAILS = (
-    *("load.work", "load.opposing", "load.peak_ratio", "load.rms_ratio", "load.saturated"),
-    *("energy.motor", "energy.force", "energy.ground", "energy.constraints", "energy.step"),
-    *("energy.kinetic", "energy.potential", "energy.turnover"),
-)
-"""Metrics that are shown only where they have a limit, or where motors saturate."""
-
-
-SMALLER = {"mm": "um", "um": "nm"}
-"""The unit a thousand times smaller, for values that would have two zeros behind the point."""
-
 WIDEST = 300
 """Columns of a table that goes into a file or a pipe, at most; there it takes what it needs."""
-
-
-def shown(key: str, value: float | None) -> str:
-    """Return a metric's value in the unit that people read."""
-    _, scale, unit = SHOWN[key]
-    if value is None:
-        return "undefined"
-    number = scale * value
-    while 0.0 < abs(number) < 0.01 and unit in SMALLER:
-        number, unit = 1e3 * number, SMALLER[unit]
-    return f"{number:.4g} {unit}".strip()
-
-
-def bounds(limit: Limit) -> str:
-    """Return a limit in the unit that people read: "<= 1.3 mm", "40 to 60 %"."""
-    if limit.low == -math.inf:
-        return f"<= {shown(limit.key, limit.high)}"
-    low, high = (shown(limit.key, bound) for bound in (limit.low, limit.high))
-    unit = high.partition(" ")[2]
-    return f"{low.removesuffix(unit).strip()} to {high}"
 
 
 def verdict(ok: bool) -> str:

@@ -20,11 +20,11 @@ import numpy as np
 
 from fivebar_sim import kinematics
 from fivebar_sim.arrays import Array
+from fivebar_sim.columns import JOINTS
 from fivebar_sim.dynamics.chain import Chain, Pose, Vector, placed
 from fivebar_sim.geometry import FiveBar
 from fivebar_sim.ground import contact_radius
 
-JOINTS = "ABED"
 """The leg's joints in the order of qpos."""
 
 TINY = 1e-9

@@ -11,11 +11,13 @@ from typing import Any
 import msgspec
 import tomli_w
 
-from fivebar_sim import console, control, guards, metrics, regression, rollout, tables
+from fivebar_sim import control, guards, regression, rollout, tables
+from fivebar_sim.catalogue import LIMIT_KEYS, SHOWN, shown
 from fivebar_sim.checks import check_number
+from fivebar_sim.columns import Record
 from fivebar_sim.control import Feedback, Setpoints
 from fivebar_sim.errors import ArgumentError, ConfigError, FiveBarError, unknown
-from fivebar_sim.metrics import Limit, Record
+from fivebar_sim.limits import Limit, bounds, judge
 from fivebar_sim.rollout import Result
 from fivebar_sim.scenario import Scenario
 
@@ -88,7 +90,7 @@ class LegRun:
             ArgumentError: No such metric in this run, no bound, or low > high.
         """
         __tracebackhide__ = True
-        known = [each for each in metrics.LIMIT_KEYS if each.split(".")[0] in self.metrics]
+        known = [each for each in LIMIT_KEYS if each.split(".")[0] in self.metrics]
         if key not in known:
             raise ArgumentError(unknown("metric", key, known))
         if low is None and high is None:
@@ -100,11 +102,11 @@ class LegRun:
         tripped = guards.tripped(self.metrics["guards"])
         if tripped:
             raise AssertionError("\n  ".join([f"{self.scenario.name} fails:", *tripped]))
-        bounds = (-inf if low is None else low, inf if high is None else high)
-        (judged,) = metrics.judge(self.metrics, {key: bounds})
+        allowed = (-inf if low is None else low, inf if high is None else high)
+        (judged,) = judge(self.metrics, {key: allowed})
         if not judged.ok:
-            legal = console.bounds(judged) if high is not None else f">= {console.shown(key, low)}"
-            said = f"{console.SHOWN[key][0]}: {console.shown(key, judged.value)}, limit {legal}"
+            legal = bounds(judged) if high is not None else f">= {shown(key, low)}"
+            said = f"{SHOWN[key][0]}: {shown(key, judged.value)}, limit {legal}"
             raise AssertionError(f"{self.scenario.name} fails:\n  {said}")
 
 

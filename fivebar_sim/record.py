@@ -8,12 +8,14 @@ import numpy as np
 
 from fivebar_sim import energy, kinematics
 from fivebar_sim.arrays import Array, Bools
+from fivebar_sim.columns import JOINT_COLUMNS, Record
 from fivebar_sim.errors import DivergedError
-from fivebar_sim.metrics import JOINT_COLUMNS, Record, Unrecorded, left_path
+from fivebar_sim.measure import Unrecorded
 from fivebar_sim.scenes import Ground, Treadmill
 from fivebar_sim.servo import Drive, applied_torque
 from fivebar_sim.servo import saturated as clipped
 from fivebar_sim.simulate import States
+from fivebar_sim.tracking import left_path
 
 if TYPE_CHECKING:
     from fivebar_sim.rollout import Plan

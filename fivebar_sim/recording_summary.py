@@ -6,8 +6,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from fivebar_sim import guards
-from fivebar_sim.console import SHOWN, bounds, shown
-from fivebar_sim.metrics import Limit, judge, look_up
+from fivebar_sim.catalogue import SHOWN, shown
+from fivebar_sim.limits import Limit, bounds, judge, look_up
 
 
 def summary(

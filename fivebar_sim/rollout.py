@@ -10,17 +10,19 @@ from typing import Any, NamedTuple
 import mujoco
 import numpy as np
 
-from fivebar_sim import feedback, holding, metrics, model, motion
+from fivebar_sim import feedback, holding, measure, model, motion
 from fivebar_sim.arrays import Array
+from fivebar_sim.columns import Record
 from fivebar_sim.control import Feedback, Setpoints
 from fivebar_sim.errors import ArgumentError, ConfigError, DivergedError, FiveBarError
-from fivebar_sim.metrics import Limit, Record
+from fivebar_sim.limits import Limit, judge
 from fivebar_sim.motion import Motion
 from fivebar_sim.provenance import provenance
 from fivebar_sim.record import broken, columns, unrecorded
 from fivebar_sim.scenario import Scenario
 from fivebar_sim.scenes import Ground, Payload
 from fivebar_sim.simulate import States, Watch, check, simulate
+from fivebar_sim.tracking import lost_path
 
 
 class Plan(NamedTuple):
@@ -224,15 +226,15 @@ def _result(planned: Plan, states: States) -> Result:
     except DivergedError as error:
         raise broken(planned, states, error) from None
     record = columns(planned, states)
-    lost = metrics.lost_path(scenario.leg, record)
+    lost = lost_path(scenario.leg, record)
     if lost is not None:
         far = f"it was {1e3 * scenario.leg.size:.4g} mm away from it at t = {lost:g} s"
         raise broken(planned, states, DivergedError(far, lost))
     try:
-        measured = metrics.measure(scenario, record, unrecorded(planned, states))
+        measured = measure.measure(scenario, record, unrecorded(planned, states))
     except ArgumentError as error:  # torques that no motor could have
         raise broken(planned, states, DivergedError(str(error), scenario.sim.timestep)) from error
-    limits = metrics.judge(measured, scenario.limits)
+    limits = judge(measured, scenario.limits)
     good = all(limit.ok for limit in limits) and all(each["ok"] for each in measured["guards"])
     measured["verdict"] = "pass" if good else "fail"
     measured["limits"] = [

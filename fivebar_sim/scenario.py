@@ -12,13 +12,13 @@ import numpy as np
 
 from fivebar_sim import forces, paths, resources, scenario_table, tables
 from fivebar_sim.arrays import Array
+from fivebar_sim.catalogue import GROUND_KEYS, LIMIT_KEYS
 from fivebar_sim.control import Feedback, Setpoints
 from fivebar_sim.errors import ArgumentError, ConfigError, unknown
 from fivebar_sim.forces import FootForce
 from fivebar_sim.geometry import FiveBar
 from fivebar_sim.guards import Guards
 from fivebar_sim.integrator import Sim
-from fivebar_sim.metrics import GROUND_KEYS, LIMIT_KEYS
 from fivebar_sim.paths import FootPath, Gait
 from fivebar_sim.scenes import Air, Ground, Payload, Scene, Treadmill
 from fivebar_sim.sensors import Sensors

@@ -9,8 +9,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from fivebar_sim import run_directory
+from fivebar_sim.columns import JOINT_COLUMNS, Record
 from fivebar_sim.errors import FiveBarError, RunDirectoryError
-from fivebar_sim.metrics import JOINT_COLUMNS, Record
 from fivebar_sim.scenario import Scenario
 from fivebar_sim.scenes import Ground, Treadmill
 

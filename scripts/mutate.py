@@ -67,7 +67,12 @@ ROOMS = {
         ),
     ),
     "metrics": Room(
-        ("fivebar_sim/metrics.py", "fivebar_sim/load.py", "fivebar_sim/ground.py"),
+        (
+            "fivebar_sim/measure.py",
+            "fivebar_sim/tracking.py",
+            "fivebar_sim/load.py",
+            "fivebar_sim/ground.py",
+        ),
         ("load", "ground", "metrics_laws"),
     ),
 }

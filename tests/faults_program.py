@@ -15,7 +15,7 @@ from controllers.computed_torque import ComputedTorque
 from controllers.impedance import Impedance
 from controllers.pd import Pd
 from controllers.servo import Servo as Planned
-from fivebar_sim import dynamics, feedback, ground, kinematics, metrics, motion, record, rollout
+from fivebar_sim import dynamics, feedback, ground, kinematics, measure, motion, record, rollout
 from fivebar_sim.control_step import ControlStep
 from fivebar_sim.paths import Ellipse, Gait, base, csv, shapes
 from fivebar_sim.scenario import Scenario
@@ -257,6 +257,6 @@ RECORD = (
     Fault(
         "the mirrored assembly taken for right", ELLIPSE, around(kinematics, "branch", turned_over)
     ),
-    Fault("errors summed and not averaged", ELLIPSE, around(metrics, "_rms", summed)),
+    Fault("errors summed and not averaged", ELLIPSE, around(measure, "_rms", summed)),
 )
 PROGRAM = (*PATHS, *PLANS, *CONTROLLERS, *STEP, *RECORD)

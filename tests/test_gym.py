@@ -15,7 +15,7 @@ from gymnasium.utils.env_checker import check_env
 
 import fivebar_sim.gym
 from controllers.servo import Servo as Feedforward
-from fivebar_sim import Scenario, kinematics, metrics, motion, run
+from fivebar_sim import Scenario, ground, kinematics, motion, run
 from fivebar_sim.errors import ArgumentError, ConfigError
 from fivebar_sim.gym import LegEnv
 from fivebar_sim.scenes import Treadmill
@@ -153,7 +153,7 @@ def test_observation_is_the_state() -> None:
     np.testing.assert_array_equal(seen["foot"], kinematics.chain_points(env.task.leg, q[1:]).F)
     assert seen["hip_z"] == q[0]
     record = {"hip_z": q[:1], "foot_z": seen["foot"][1:]}
-    height = float(metrics.ground.height(env.task.leg, record)[0])
+    height = float(ground.height(env.task.leg, record)[0])
     assert seen["contact"] == (height <= 1e-6)
 
 

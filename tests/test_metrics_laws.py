@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from fivebar_sim import energy, ground, guards, kinematics, load, metrics
+from fivebar_sim import energy, ground, guards, kinematics, load, measure, metrics
 from fivebar_sim.arrays import Array, Bools
 from fivebar_sim.errors import ArgumentError
 from fivebar_sim.geometry import FiveBar
@@ -52,12 +52,12 @@ def on_floor(record: dict[str, Array], down: Array) -> dict[str, Array]:
     return {**record, **lifted, "ground_x": 0.1 * down, "ground_z": 5.0 * down}
 
 
-def besides(record: dict[str, Array], saturated: Bools | None = None) -> metrics.Unrecorded:
+def besides(record: dict[str, Array], saturated: Bools | None = None) -> measure.Unrecorded:
     """Return what a run did besides: its constraints are as random as its record."""
     start = np.array([0.1, START[0], 1.5, START[1], -1.5])
     size = 5 if "hip_z" in record else 4
     constraint = np.random.default_rng(3).standard_normal((ROWS, size))
-    return metrics.Unrecorded(
+    return measure.Unrecorded(
         steps=energy.Steps(start[-size:], constraint, np.zeros((ROWS, 0))),
         saturated=np.zeros((ROWS, 2), dtype=bool) if saturated is None else saturated,
         unsolved=np.arange(ROWS) == 700,
@@ -68,7 +68,7 @@ def besides(record: dict[str, Array], saturated: Bools | None = None) -> metrics
 def measured(
     scenario: Scenario, record: dict[str, Array], saturated: Bools | None = None
 ) -> dict[str, Any]:
-    return metrics.measure(scenario, record, besides(record, saturated))
+    return measure.measure(scenario, record, besides(record, saturated))
 
 
 def motors(record: dict[str, Array], name: str) -> Array:

@@ -12,8 +12,9 @@ import pyarrow.parquet
 import pytest
 from shell import Shell
 
-from fivebar_sim import console, kinematics, load, metrics, record, rollout
+from fivebar_sim import kinematics, load, metrics, record, rollout
 from fivebar_sim.arrays import Array
+from fivebar_sim.catalogue import SHOWN, shown
 from fivebar_sim.errors import ConfigError
 from fivebar_sim.rollout import Plan, Result
 from fivebar_sim.scenario import Scenario
@@ -168,8 +169,8 @@ def test_every_limit_resolves_and_is_shown() -> None:
     for key in metrics.LIMIT_KEYS:
         value = metrics.look_up(measured, key)
         assert isinstance(value, (int, float)), key
-        assert console.shown(key, value)
-    assert set(console.SHOWN) == set(metrics.LIMIT_KEYS)
+        assert shown(key, value)
+    assert set(SHOWN) == set(metrics.LIMIT_KEYS)
     limits: dict[str, tuple[float, float]] = {key: (-1e9, 1e9) for key in metrics.LIMIT_KEYS}
     judged = metrics.judge(measured, limits)
     assert [limit.key for limit in judged] == list(metrics.LIMIT_KEYS)

@@ -7,16 +7,17 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fivebar_sim import ground, metrics, tables
+from fivebar_sim import ground, tables
 from fivebar_sim.arrays import Array
-from fivebar_sim.console import SHOWN, bounds, shown
-from fivebar_sim.metrics import look_up
+from fivebar_sim.catalogue import SHOWN, shown
+from fivebar_sim.limits import bounds, look_up
 from fivebar_sim.recording_series import points
 from fivebar_sim.report import draw, html, numbers
 from fivebar_sim.report.draw import Drawn
 from fivebar_sim.report.html import Cell, plain, text
 from fivebar_sim.report.look import colour
 from fivebar_sim.stored_run import StoredRun
+from fivebar_sim.tracking import tracking_error
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -165,7 +166,7 @@ PLOTS: tuple[tuple[str, str, str, dict[str, Column], bool], ...] = (
         "tracking-error",
         "Tracking error",
         "How far the foot is from its target, the largest error of each moment.",
-        {"|foot - target| [mm]": lambda run: 1e3 * metrics.tracking_error(run.record)},
+        {"|foot - target| [mm]": lambda run: 1e3 * tracking_error(run.record)},
         True,
     ),
     (

@@ -9,15 +9,16 @@ from typing import Any
 
 import numpy as np
 
-from fivebar_sim import guards, metrics, tables
+from fivebar_sim import guards, tables
 from fivebar_sim.arrays import Array
+from fivebar_sim.catalogue import GROUND_KEYS, SHOWN
 from fivebar_sim.checks import is_finite
-from fivebar_sim.console import SHOWN
 from fivebar_sim.control import Feedback
 from fivebar_sim.errors import RunDirectoryError
-from fivebar_sim.metrics import GROUND_KEYS, Limit
+from fivebar_sim.limits import Limit, judge, look_up
 from fivebar_sim.recording_series import SHARE_WINDOW, load_share
 from fivebar_sim.stored_run import StoredRun
+from fivebar_sim.tracking import tracking_error
 
 PERCENTILE = 95.0
 """Of the tracking error, beside its RMS."""
@@ -38,7 +39,7 @@ def check(run: StoredRun) -> None:
         raise RunDirectoryError(f"{file}: guards are not those of a run") from None
     for key in keys(run):
         try:
-            value = metrics.look_up(run.metrics, key)
+            value = look_up(run.metrics, key)
         except (KeyError, TypeError):
             raise RunDirectoryError(f"{file} lacks the metric {key}") from None
         if value is not None and not is_finite(value):
@@ -85,12 +86,12 @@ def keys(run: StoredRun) -> list[str]:
 
 def limits(run: StoredRun) -> list[Limit]:
     """Return every limit of the scenario with its value."""
-    return metrics.judge(run.metrics, run.scenario.limits)
+    return judge(run.metrics, run.scenario.limits)
 
 
 def percentile(run: StoredRun) -> float:
     """Return the tracking error that 95 % of the measured steps stay below [m]."""
-    error = metrics.tracking_error(run.record)[run.scenario.window]
+    error = tracking_error(run.record)[run.scenario.window]
     return float(np.percentile(error, PERCENTILE))
 
 

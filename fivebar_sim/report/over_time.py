@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from fivebar_sim import ground, metrics
+from fivebar_sim import ground, tracking
 from fivebar_sim.arrays import Array
-from fivebar_sim.console import shown
-from fivebar_sim.metrics import look_up
+from fivebar_sim.catalogue import shown
+from fivebar_sim.limits import look_up
 from fivebar_sim.recording_series import SHARE_WINDOW
 from fivebar_sim.report import draw, numbers
 from fivebar_sim.report.draw import Drawn
@@ -25,7 +25,7 @@ IN_VIEW = 3.0
 
 def tracking_error(run: StoredRun) -> Drawn:
     """Draw the foot's distance from its target, its RMS and what 95 % of it stay below."""
-    error, most = metrics.tracking_error(run.record), numbers.percentile(run)
+    error, most = tracking.tracking_error(run.record), numbers.percentile(run)
     rms = look_up(run.metrics, "tracking.rms") or 0.0
     scale, unit = draw.length_unit(float(error.max()))
     figure, (ax,) = draw.panels(1, height=2.9)

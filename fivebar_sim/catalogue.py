@@ -1,0 +1,106 @@
+"""The metrics of a run: one row each, with what it is called and how far it may move."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+
+class Metric(NamedTuple):
+    """One metric.
+
+    Attributes:
+        key: Its dotted key in metrics.json, in SI units.
+        label: What people call it.
+        scale: The factor from SI to the shown unit.
+        unit: The shown unit.
+        tolerance: By how much it may move from a baseline besides its relative part, in its SI
+            unit; None where baselines leave it out.
+        less_is_better: Whether it fails only when it grows. Any other fails when it moves: less
+            torque over a whole run, or another share of it, is not what the leg needs for its
+            path, until someone says so.
+        detail: Shown only where it has a limit.
+    """
+
+    key: str
+    label: str
+    scale: float
+    unit: str
+    tolerance: float | None = None
+    less_is_better: bool = False
+    detail: bool = False
+
+
+CATALOGUE = (
+    Metric("tracking.rms", "tracking RMS", 1e3, "mm", tolerance=1e-9, less_is_better=True),
+    Metric("tracking.max", "tracking max", 1e3, "mm", tolerance=1e-9, less_is_better=True),
+    Metric("closure.rms", "loop gap RMS", 1e6, "um", tolerance=1e-9, less_is_better=True),
+    Metric("closure.max", "loop gap max", 1e6, "um", tolerance=1e-9, less_is_better=True),
+    Metric("load.torque_rms.A", "torque A RMS", 1e3, "mN m", tolerance=1e-6),
+    Metric("load.torque_rms.E", "torque E RMS", 1e3, "mN m", tolerance=1e-6),
+    Metric("load.torque_peak.A", "torque A peak", 1e3, "mN m", tolerance=1e-6, less_is_better=True),
+    Metric("load.torque_peak.E", "torque E peak", 1e3, "mN m", tolerance=1e-6, less_is_better=True),
+    Metric("load.share_A", "load share A", 1e2, "%", tolerance=2e-3),
+    Metric("load.thermal_share_A", "thermal share A", 1e2, "%", tolerance=2e-3),
+    Metric("load.peak_ratio", "peak torque ratio", 1.0, "", detail=True),
+    Metric("load.rms_ratio", "torque RMS ratio", 1.0, "", detail=True),
+    Metric("load.work.A.positive", "work A given", 1e3, "mJ", detail=True),
+    Metric("load.work.A.negative", "work A taken", 1e3, "mJ", detail=True),
+    Metric("load.work.A.net", "work A net", 1e3, "mJ", detail=True),
+    Metric("load.work.E.positive", "work E given", 1e3, "mJ", detail=True),
+    Metric("load.work.E.negative", "work E taken", 1e3, "mJ", detail=True),
+    Metric("load.work.E.net", "work E net", 1e3, "mJ", detail=True),
+    Metric("load.opposing.fraction", "motors opposed", 1e2, "%", detail=True),
+    Metric("load.opposing.energy", "energy motor to motor", 1e3, "mJ", detail=True),
+    Metric("load.saturated.A", "motor A saturated", 1e2, "%", tolerance=2e-3, less_is_better=True),
+    Metric("load.saturated.E", "motor E saturated", 1e2, "%", tolerance=2e-3, less_is_better=True),
+    Metric("ground.force_max.x", "ground force x max", 1.0, "N", tolerance=1e-3),
+    Metric("ground.force_max.z", "ground force z max", 1.0, "N", tolerance=1e-3),
+    Metric("ground.stance_share", "time in stance", 1e2, "%", tolerance=2e-3),
+    Metric("ground.slip", "slip in stance", 1e3, "mm", tolerance=1e-6, less_is_better=True),
+    Metric("ground.foot_height_max", "foot height max", 1e3, "mm", tolerance=1e-6),
+    Metric("ground.flight_max", "longest flight", 1e3, "ms", tolerance=2e-3),
+    Metric("energy.motor", "work of the motors", 1e3, "mJ", detail=True),
+    Metric("energy.force", "work of the pushes", 1e3, "mJ", detail=True),
+    Metric("energy.ground", "work of the ground", 1e3, "mJ", detail=True),
+    Metric("energy.constraints", "work of loop, gears, ends", 1e3, "mJ", detail=True),
+    Metric("energy.step", "given by the steps", 1e3, "mJ", detail=True),
+    Metric("energy.kinetic", "kinetic energy gained", 1e3, "mJ", detail=True),
+    Metric("energy.potential", "potential energy gained", 1e3, "mJ", detail=True),
+    Metric("energy.turnover", "energy turned over", 1e3, "mJ", detail=True),
+    Metric("energy.imbalance", "energy imbalance", 1e2, "%"),
+    Metric("branch.flips", "branch flips", 1.0, ""),
+    Metric("warnings", "MuJoCo warnings", 1.0, ""),
+)
+"""Every metric that a scenario may set a limit on, in the order in which they are shown."""
+
+LIMIT_KEYS = tuple(metric.key for metric in CATALOGUE)
+"""The metrics that a scenario may set limits on."""
+
+GROUND_KEYS = tuple(key for key in LIMIT_KEYS if key.startswith("ground."))
+"""The metrics of scenes with a ground."""
+
+SHOWN = {metric.key: (metric.label, metric.scale, metric.unit) for metric in CATALOGUE}
+"""What a metric is called, the factor from SI to the shown unit, and that unit."""
+
+DETAILS = tuple(metric.key for metric in CATALOGUE if metric.detail)
+"""Metrics that are shown only where they have a limit."""
+
+ABSOLUTE = {metric.key: metric.tolerance for metric in CATALOGUE if metric.tolerance is not None}
+"""The metrics of a baseline, and by how much more each may move, in its own unit."""
+
+LESS_IS_BETTER = tuple(metric.key for metric in CATALOGUE if metric.less_is_better)
+"""Metrics of a baseline that fail only when they grow."""
+
+SMALLER = {"mm": "um", "um": "nm"}
+"""The unit a thousand times smaller, for values that would have two zeros behind the point."""
+
+
+def shown(key: str, value: float | None) -> str:
+    """Return a metric's value in the unit that people read."""
+    _, scale, unit = SHOWN[key]
+    if value is None:
+        return "undefined"
+    number = scale * value
+    while 0.0 < abs(number) < 0.01 and unit in SMALLER:
+        number, unit = 1e3 * number, SMALLER[unit]
+    return f"{number:.4g} {unit}".strip()

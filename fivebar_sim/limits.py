@@ -1,0 +1,45 @@
+"""Limits on metrics, and whether a run keeps them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+from fivebar_sim.catalogue import shown
+
+
+class Limit(NamedTuple):
+    """One limit and what came of it; `ok` where low <= value <= high."""
+
+    key: str
+    low: float
+    high: float
+    value: float | None
+    ok: bool
+
+
+def look_up(metrics: Mapping[str, Any], key: str) -> float | None:
+    """Return the metric of a dotted key ("load.torque_rms.A")."""
+    value: Any = metrics
+    for part in key.split("."):
+        value = value[part]
+    return value
+
+
+def judge(metrics: Mapping[str, Any], limits: Mapping[str, tuple[float, float]]) -> list[Limit]:
+    """Return every limit with its value. A metric that is undefined fails its limit."""
+    judged = []
+    for key, (low, high) in limits.items():
+        value = look_up(metrics, key)
+        judged.append(Limit(key, low, high, value, value is not None and low <= value <= high))
+    return judged
+
+
+def bounds(limit: Limit) -> str:
+    """Return a limit in the unit that people read: "<= 1.3 mm", "40 to 60 %"."""
+    if limit.low == -math.inf:
+        return f"<= {shown(limit.key, limit.high)}"
+    low, high = (shown(limit.key, bound) for bound in (limit.low, limit.high))
+    unit = high.partition(" ")[2]
+    return f"{low.removesuffix(unit).strip()} to {high}"

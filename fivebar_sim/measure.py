@@ -1,0 +1,122 @@
+"""What a run is judged by: foot tracking, loop closure, load of the motors, energy, branch."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from fivebar_sim import energy, ground, guards, kinematics, load
+from fivebar_sim.arrays import Array, Bools
+from fivebar_sim.columns import JOINT_COLUMNS
+from fivebar_sim.geometry import FiveBar
+from fivebar_sim.paths import Gait
+from fivebar_sim.tracking import tracking_error
+
+if TYPE_CHECKING:
+    from fivebar_sim.scenario import Scenario
+
+
+class Unrecorded(NamedTuple):
+    """What a run did besides its record.
+
+    Attributes:
+        steps: What acted, and where it began.
+        saturated: Whether the torque limit clipped A and E in each step, (N, 2).
+        unsolved: Whether MuJoCo's solver ran out of iterations in each step, (N,).
+        warnings: MuJoCo's warnings.
+    """
+
+    steps: energy.Steps
+    saturated: Bools
+    unsolved: Bools
+    warnings: int
+
+
+def measure(scenario: Scenario, record: Mapping[str, Array], besides: Unrecorded) -> dict[str, Any]:
+    """Return the metrics of a run, in SI units.
+
+    With e = |foot - target| over the window, tracking.rms = sqrt(mean e^2); load is that of
+    `load.measure`, and saturated the part of the steps in which the torque limit clipped. closure
+    is the loop gap over the whole run, energy that of `energy.measure`; branch and guards look at
+    every step.
+
+    Args:
+        scenario: What was run.
+        record: The columns of rollout.parquet.
+        besides: What its record does not say.
+    """
+    leg, start, saturated = scenario.leg, besides.steps.start[-4::2], besides.saturated
+    body = energy.Body(leg, scenario.payload, scenario.trunk)
+    balance = energy.balance(body, record, besides.steps)
+    branch = _branch(leg, record)
+    guarded = guards.judge(
+        scenario.guards,
+        leg,
+        record,
+        branch=branch,
+        saturated=saturated,
+        balance=balance,
+        unsolved=besides.unsolved,
+        command=scenario.command,
+    )
+    window = scenario.window
+    error, gap = tracking_error(record)[window], record["gap"]
+    measured = {
+        "tracking": {"rms": _rms(error), "max": float(error.max())},
+        "closure": {"rms": _rms(gap), "max": float(gap.max())},
+        "load": _load(scenario, record, start, saturated),
+        "energy": energy.measure(balance),
+        "branch": branch,
+        "guards": [{**guard._asdict(), "ok": guard.ok} for guard in guarded],
+        "warnings": int(besides.warnings),
+    }
+    if "ground_z" in record:
+        measured["ground"] = ground.measure(leg, record, window)
+    return measured
+
+
+def _load(
+    scenario: Scenario, record: Mapping[str, Array], start: Array, saturated: Bools
+) -> dict[str, Any]:
+    """Return how the motors share the load over the window, and how often they were clipped."""
+    window, path, h = scenario.window, scenario.path, scenario.sim.timestep
+    torque, theta = (
+        np.stack([record[f"{name}_A"], record[f"{name}_E"]], axis=-1)
+        for name in ("torque", "theta")
+    )
+    turned = np.concatenate([start[None], theta])[window.start : window.stop + 1]
+    begun = np.maximum(record["time"][window] - h, 0.0)  # when the steps began
+    phase = stance = None
+    if path.period is not None:
+        phase = path.cycle(begun)
+    if "ground_z" in record:
+        stance = ground.stands(record)[window]
+    elif isinstance(path, Gait):
+        stance = path.in_stance(begun)
+    measured = load.measure(torque[window], turned, h, stance=stance, phase=phase)
+    clipped = saturated[window].mean(axis=0).tolist()
+    return {**measured, "saturated": dict(zip("AE", clipped, strict=True))}
+
+
+def _branch(leg: FiveBar, record: Mapping[str, Array]) -> dict[str, Any]:
+    """Return the branch of the last step, how often it flipped, and when first.
+
+    Every step is compared with the one before, the first with the leg's own branch.
+    """
+    q = np.stack([record[name] for name in JOINT_COLUMNS], axis=-1)
+    signs = np.stack(kinematics.branch(leg, kinematics.chain_points(leg, q)), axis=-1)
+    own = np.array([*leg.mode, leg.assembly])
+    flipped = np.any(np.diff(signs, axis=0, prepend=own[None]) != 0, axis=-1)
+    s_A, s_E, assembly = signs[-1].tolist()
+    return {
+        "working_mode": [s_A, s_E],
+        "assembly": assembly,
+        "flips": int(flipped.sum()),
+        "first_flip": float(record["time"][np.argmax(flipped)]) if flipped.any() else None,
+    }
+
+
+def _rms(values: Array) -> float:
+    return float(np.sqrt(np.mean(values**2)))

@@ -1,0 +1,33 @@
+"""How far the foot is from its path, when it left it, and when it was lost."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from fivebar_sim.arrays import Array
+from fivebar_sim.geometry import FiveBar
+
+
+def tracking_error(record: Mapping[str, Array]) -> Array:
+    """Return the distance of the foot from its target [m], (N,)."""
+    return np.hypot(record["foot_x"] - record["target_x"], record["foot_z"] - record["target_z"])
+
+
+def lost_path(leg: FiveBar, record: Mapping[str, Array]) -> float | None:
+    """Return when the foot first was farther from its target than the leg is long [s], or None."""
+    lost = tracking_error(record) > leg.size
+    return float(record["time"][np.argmax(lost)]) if lost.any() else None
+
+
+def left_path(leg: FiveBar, record: Mapping[str, Array], by: float) -> float:
+    """Return when the foot left its path [s]: the last time within a tenth of the leg's size of it.
+
+    Args:
+        leg: The leg.
+        record: The columns of rollout.parquet.
+        by: When it was lost, or the simulation broke down [s].
+    """
+    near = (tracking_error(record) <= 0.1 * leg.size) & (record["time"] <= by)
+    return float(record["time"][np.flatnonzero(near)[-1]]) if near.any() else 0.0
