@@ -3,20 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, NamedTuple, cast
+from typing import NamedTuple, cast
 
 import numpy as np
 
 from fivebar_sim.arrays import Array
 from fivebar_sim.control import Feedback, Reference
-from fivebar_sim.control_step import ControlStep, whole_steps
+from fivebar_sim.control_step import ControlStep
 from fivebar_sim.errors import ConfigError, DivergedError, FiveBarError, PoseError
 from fivebar_sim.motion import Motion
+from fivebar_sim.plan import Plan, period_steps
 from fivebar_sim.record import broken
 from fivebar_sim.simulate import States, Watch, check, is_broken, simulate_asking
-
-if TYPE_CHECKING:
-    from fivebar_sim.rollout import Plan
 
 MOTORS = [-4, -2]
 """Where qpos and qvel have A and E."""
@@ -80,16 +78,6 @@ def _raise_broken(plans: Sequence[Plan], states: States) -> None:
             check(own, plan.motion.timestep)
         except DivergedError as error:
             raise broken(plan, own, error) from None
-
-
-def period_steps(plan: Plan) -> int:
-    """Return the timesteps of a plan's control period.
-
-    Raises:
-        ArgumentError: It is no whole number of them.
-    """
-    controller = cast(Feedback, plan.scenario.controller)
-    return whole_steps("controller.period", controller.period, plan.motion.timestep)
 
 
 def _groups(plans: Sequence[Plan]) -> list[_Group]:

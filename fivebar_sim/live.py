@@ -20,6 +20,7 @@ from fivebar_sim import recording_foot as foot
 from fivebar_sim import recording_ground as ground
 from fivebar_sim import recording_scene as scene
 from fivebar_sim.errors import ConfigError
+from fivebar_sim.plan import Plan
 from fivebar_sim.record import columns
 from fivebar_sim.recording_look import Look
 from fivebar_sim.recording_motion import Motion, Stage, motion, stage
@@ -30,7 +31,6 @@ from fivebar_sim.simulate import States, Watch
 if TYPE_CHECKING:
     import rerun as rr
 
-    from fivebar_sim.rollout import Plan
 
 RATE = 60.0
 """Poses for a second of the run [Hz]."""

@@ -16,6 +16,7 @@ import numpy as np
 import pytest
 
 from fivebar_sim import model, rollout
+from fivebar_sim import plan as planning
 from fivebar_sim.arrays import Array
 from fivebar_sim.simulate import Legs
 
@@ -178,8 +179,8 @@ MODEL = (
     Fault("belt 2 % fast", TROT, built(scaled("geom_surfacevel", 1.02))),
     Fault("rail without its end", TROT, built(fixed("jnt_limited", 0))),
     Fault("floor half as stiff", "rail-landing", built(scaled("geom_solref", 2.0))),
-    Fault("drop left out", "rail-landing", around(rollout, "_above_ground", on_the_floor)),
-    Fault("commands a step late", ELLIPSE, around(rollout, "_setpoints", a_step_late)),
+    Fault("drop left out", "rail-landing", around(planning, "_above_ground", on_the_floor)),
+    Fault("commands a step late", ELLIPSE, around(planning, "_setpoints", a_step_late)),
     Fault("motors swapped", ELLIPSE, commanded(swapped)),
     Fault("commands 0.1 % large", "payload-ellipse", commanded(lambda ctrl: 1.001 * ctrl)),
     Fault(

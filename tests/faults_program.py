@@ -16,6 +16,7 @@ from controllers.impedance import Impedance
 from controllers.pd import Pd
 from controllers.servo import Servo as Planned
 from fivebar_sim import dynamics, feedback, ground, kinematics, measure, motion, record, rollout
+from fivebar_sim import plan as planning
 from fivebar_sim.control_step import ControlStep
 from fivebar_sim.paths import Ellipse, Gait, base, csv, shapes
 from fivebar_sim.scenario import Scenario
@@ -245,7 +246,7 @@ STEP = (
     Fault("steps of the sensors ignored", SENSORS, seeing(resolution=0.0)),
     Fault("seed ignored", SENSORS, around(ControlStep, "__init__", seedless)),
     Fault("back-EMF not made up for", SENSORS, around(ControlStep, "send", uncompensated)),
-    Fault("control period twice as long", LANDING, around(feedback, "whole_steps", times(2))),
+    Fault("control period twice as long", LANDING, around(planning, "whole_steps", times(2))),
 )
 RECORD = (
     Fault("torque of the start of the step", ELLIPSE, around(record, "applied_torque", raw_torque)),

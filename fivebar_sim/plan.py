@@ -1,0 +1,131 @@
+"""Plans: a scenario that was found possible, with all that its simulation needs."""
+
+from __future__ import annotations
+
+from typing import NamedTuple, cast
+
+import mujoco
+import numpy as np
+
+from fivebar_sim import holding, model, motion
+from fivebar_sim.arrays import Array
+from fivebar_sim.control import Feedback, Setpoints
+from fivebar_sim.control_step import whole_steps
+from fivebar_sim.errors import ConfigError, FiveBarError
+from fivebar_sim.motion import Motion
+from fivebar_sim.scenario import Scenario
+from fivebar_sim.scenes import Ground, Payload
+
+
+class Plan(NamedTuple):
+    """A scenario that was found possible: what the foot shall do, and what the servos are sent.
+
+    Attributes:
+        scenario: What was asked for.
+        motion: The foot and the joints at every step.
+        model: The leg's model.
+        start: qpos at t = 0, (nq,).
+        pushes: Commands of the actuators that are no motors, the forces on the foot in the scene
+            "payload", at every step [N], (N, 0 or 2).
+        setpoints: What reaches the motors in every step [rad], (N, 2); None where a feedback
+            controller decides on the way.
+    """
+
+    scenario: Scenario
+    motion: Motion
+    model: mujoco.MjModel
+    start: Array
+    pushes: Array
+    setpoints: Array | None
+
+    @property
+    def ctrl(self) -> Array:
+        """The commands of every step, as MuJoCo has them, (N, nu); not of a feedback controller."""
+        assert self.setpoints is not None
+        return np.concatenate([self.pushes, self.setpoints], axis=1)
+
+
+def plan(scenario: Scenario) -> Plan:
+    """Return the plan of a scenario, without simulating anything.
+
+    Raises:
+        UnreachableError: The path leaves what the leg can reach; says when and where.
+        ConfigError: A controller that plans setpoints of the wrong shape or not finite, a control
+            period that is no whole number of timesteps, or servos that cannot hold the leg.
+        GeometryError: A leg that cannot stand on the scene's ground.
+    """
+    sim, scene = scenario.sim, scenario.scene
+    wanted = motion.plan(
+        scenario.leg,
+        scenario.path,
+        scenario.steps,
+        sim.timestep,
+        force=scenario.foot_force,
+        payload=scenario.payload,
+    )
+    holding.check(scenario, wanted)
+    start, pushes = wanted.q[0], np.empty((scenario.steps, 0))
+    if isinstance(scene, Ground):
+        start = _above_ground(scenario, scene, start)
+    if isinstance(scene, Payload):
+        pushes = wanted.force[:-1]
+    controller = scenario.controller
+    asked = isinstance(controller, Feedback)
+    built = model.build(
+        scenario.leg,
+        servo=scenario.servo,
+        scene=scene,
+        timestep=sim.timestep,
+        integrator=sim.integrator,
+        drive=controller.drive if asked else "position",
+    )
+    setpoints = None if asked else _setpoints(scenario, controller, wanted)
+    planned = Plan(scenario, wanted, built, start, pushes, setpoints)
+    if asked:
+        period_steps(planned)
+    return planned
+
+
+def _above_ground(scenario: Scenario, scene: Ground, q: Array) -> Array:
+    """Return qpos of a leg whose foot is at the scene's height over the floor, (5,).
+
+    Raises:
+        ConfigError: The rail ends above that.
+    """
+    height = model.standing(scenario.leg, q) + scene.drop
+    if scene.stop is not None and not scene.stop <= height:
+        raise ConfigError(
+            f"scene.stop must be in [0, {height:g}] m, the hip's height at the start, "
+            f"got {scene.stop:g}"
+        )
+    return np.array([height, *q])
+
+
+def _setpoints(scenario: Scenario, controller: Setpoints, wanted: Motion) -> Array:
+    """Return the setpoints that the scenario's controller plans, checked, as they arrive."""
+    name, shape = f"controller {scenario.controller_name!r}", (scenario.steps, 2)
+    try:
+        planned = controller.setpoints(
+            scenario.leg, scenario.servo, wanted, scenario.sim.integrator
+        )
+    except FiveBarError:
+        raise
+    except Exception as error:  # a user's code may raise anything
+        raise ConfigError(f"{name} failed: {type(error).__name__}: {error}") from error
+    ctrl = np.asarray(planned)
+    if ctrl.dtype.kind not in "fiu" or ctrl.shape != shape or not np.isfinite(ctrl).all():
+        raise ConfigError(
+            f"{name} must plan finite setpoints [rad] of shape {shape}, "
+            f"got {ctrl.dtype} of shape {ctrl.shape}"
+        )
+    return scenario.servo.sent(ctrl.astype(np.float64), wanted.q[0, ::2], scenario.sim.timestep)
+
+
+def period_steps(plan: Plan) -> int:
+    """Return the timesteps of a plan's control period.
+
+    Raises:
+        ArgumentError: It is no whole number of them.
+    """
+    controller = cast(Feedback, plan.scenario.controller)
+    return whole_steps("controller.period", controller.period, plan.motion.timestep)
