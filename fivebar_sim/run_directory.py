@@ -9,16 +9,12 @@ import shutil
 import tempfile
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import tomli_w
 
 from fivebar_sim import leftovers, recording
 from fivebar_sim.arrays import Array
 from fivebar_sim.errors import RunDirectoryError
-
-if TYPE_CHECKING:
-    from fivebar_sim.rollout import Result
 
 FILES = ("scenario.toml", "metrics.json", "rollout.parquet", "recording.rrd")
 
@@ -30,7 +26,7 @@ OVERTAKEN = {errno.ENOENT, errno.ENOTEMPTY, errno.EEXIST}
 """What a rename fails with if another one came in between."""
 
 
-def write(result: Result, path: Path) -> Path:
+def write(result: recording.Run, path: Path) -> Path:
     """Write a run directory: beside its place first, then renamed, so that it is never half there.
 
     An existing run directory (or an empty one) is exchanged; anything else there is refused.
@@ -95,7 +91,7 @@ def check_run(path: Path) -> None:
         raise RunDirectoryError(f"{path} is no run directory: {what}")
 
 
-def _fill(stage: Path, result: Result) -> None:
+def _fill(stage: Path, result: recording.Run) -> None:
     """Write the files of a run into an empty directory."""
     scenario = result.scenario
     (stage / "scenario.toml").write_text(tomli_w.dumps(scenario.table()), encoding="utf-8")
