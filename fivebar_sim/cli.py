@@ -7,8 +7,9 @@ import io
 import os
 import sys
 from collections.abc import Callable, Sequence
+from importlib.metadata import version
 
-from fivebar_sim import __version__, memory, signals
+from fivebar_sim import memory, signals
 from fivebar_sim.commands.status import FAILED, INTERRUPTED, UNREAD, WRONG, say
 from fivebar_sim.errors import DivergedError, FiveBarError
 
@@ -52,7 +53,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 def _call(args: list[str]) -> int:
     """Parse the arguments and call their command; all else is imported here, within `main`."""
     if args == ["--version"]:
-        print(f"fivebar-sim {__version__}")  # noqa: T201
+        print(f"fivebar-sim {version('fivebar-sim')}")  # noqa: T201
         return 0
     if not HELP & set(args):
         memory.check()

@@ -8,14 +8,14 @@ from functools import cache
 from importlib.metadata import version
 from typing import Any
 
-from fivebar_sim import __version__, resources
+from fivebar_sim import resources
 from fivebar_sim.scenario import Scenario
 
 
 def provenance(scenario: Scenario) -> dict[str, Any]:
     """Return what a run's numbers depend on besides the scenario's physics."""
     return {
-        "fivebar_sim": __version__,
+        "fivebar_sim": version("fivebar-sim"),
         "mujoco": version("mujoco"),
         "numpy": version("numpy"),
         "python": platform.python_version(),

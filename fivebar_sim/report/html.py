@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from html import escape
+from importlib.metadata import version
 
-from fivebar_sim import __version__
 from fivebar_sim.report import look
 from fivebar_sim.report.draw import Drawn
 
@@ -90,7 +90,7 @@ def page(title: str, parts: Iterable[str]) -> str:
 </head>
 <body>
 """
-    foot = f"<footer>Written by fivebar-sim {__version__}.</footer>\n</body>\n</html>\n"
+    foot = f"<footer>Written by fivebar-sim {version('fivebar-sim')}.</footer>\n</body>\n</html>\n"
     return head + "\n".join(parts) + "\n" + foot
 
 
