@@ -3,69 +3,20 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from fivebar_sim import kinematics, whole_file, workspace
 from fivebar_sim.arrays import Array
 from fivebar_sim.errors import ConfigError
 from fivebar_sim.geometry import FiveBar
+from fivebar_sim.survey import Map, survey
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-CELLS = 241
-"""Grid points along the longer side of the map."""
-
 FORMATS = (".png", ".svg", ".pdf")
-
-
-class Map(NamedTuple):
-    """What is drawn, on a grid of foot positions; matrices are indexed [z, x].
-
-    Attributes:
-        x: [m], hip frame, (m,).
-        z: [m], (n,).
-        distance: Signed distance to the edge of what the leg's working mode reaches [m], (n, m).
-    """
-
-    x: Array
-    z: Array
-    distance: Array
-
-    @property
-    def area(self) -> float:
-        """Area of the reachable region [m^2], to a grid cell along its boundary."""
-        cell = float((self.x[1] - self.x[0]) * (self.z[1] - self.z[0]))
-        return cell * float((self.distance >= 0.0).sum())
-
-
-def survey(leg: FiveBar, cells: int = CELLS) -> Map:
-    """Return the map of a leg's whole workspace.
-
-    Args:
-        leg: The leg.
-        cells: Grid points along x and along z.
-    """
-    A, _ = kinematics.bases(leg)
-    reach = 1.05 * (leg.L1 + leg.L2 + leg.L6 + float(np.hypot(*A)))
-    line = np.linspace(-reach, reach, cells)
-    foot = np.stack(np.meshgrid(line, line), axis=-1)
-    distance = workspace.distance(leg, foot, mode=leg.mode)
-    within = distance > 0.0
-    rows, columns = _span(np.any(within, axis=1)), _span(np.any(within, axis=0))
-    return Map(line[columns], line[rows], distance[rows, columns])
-
-
-def _span(found: ArrayLike) -> slice:
-    """Return the part from a margin before the first found to one behind the last."""
-    where = np.flatnonzero(found)
-    if not len(where):
-        return slice(None)
-    margin = np.size(found) // 20
-    return slice(max(int(where[0]) - margin, 0), int(where[-1]) + margin + 1)
 
 
 def write(leg: FiveBar, out: Path, path: Array | None = None) -> Map:

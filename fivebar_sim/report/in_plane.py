@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fivebar_sim import kinematics, workspace, workspace_map
+from fivebar_sim import kinematics, workspace
 from fivebar_sim.arrays import Array
 from fivebar_sim.catalogue import shown
 from fivebar_sim.columns import JOINT_COLUMNS
@@ -17,6 +17,7 @@ from fivebar_sim.report import draw
 from fivebar_sim.report.draw import Drawn
 from fivebar_sim.report.look import colour
 from fivebar_sim.stored_run import StoredRun
+from fivebar_sim.survey import survey
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -120,7 +121,7 @@ def leg_moments(run: StoredRun) -> Drawn:
 def _workspace(ax: Axes, run: StoredRun) -> float:
     """Draw what the foot reaches and where it is singular; return the depth of its middle [m]."""
     leg = run.scenario.leg
-    surveyed = workspace_map.survey(leg, CELLS)
+    surveyed = survey(leg, CELLS)
     deepest = float(surveyed.distance.max())
     x, z = 1e3 * surveyed.x, 1e3 * surveyed.z
     for level in np.arange(BANDS) * deepest / BANDS:
