@@ -88,4 +88,4 @@ def _insist(through: threading.Event) -> None:
     """Let the handler run again and again, until the program is out of `heard`."""
     while not through.wait(PATIENCE):
         if _sent:
-            _thread.interrupt_main(_sent[0])
+            _thread.interrupt_main(signal.Signals(_sent[0]))

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from fivebar_sim import run_directory
+from fivebar_sim import load, run_directory, stored_metrics
 from fivebar_sim.columns import JOINT_COLUMNS, Record
 from fivebar_sim.errors import FiveBarError, RunDirectoryError
 from fivebar_sim.scenario import Scenario
 from fivebar_sim.scenes import Ground, Treadmill
+from fivebar_sim.simulate import SPEED_LIMIT
 
 COLUMNS = (
     *("time", "target_x", "target_z", "foot_x", "foot_z"),
@@ -21,6 +21,12 @@ COLUMNS = (
     *("ctrl_A", "ctrl_E", "torque_A", "torque_E", "gap"),
 )
 """What every record has; scenes with a ground have more."""
+
+MOST = {"theta_dot": SPEED_LIMIT, "torque": load.LARGEST}
+"""No number of columns that begin so is larger [rad/s, N m]: `simulate` and `load` see to that."""
+
+LARGEST = 1e100
+"""No number of any other column is larger: its square, and what is drawn of it, cannot overflow."""
 
 SOURCES = ("scenario.toml", "metrics.json", "rollout.parquet")
 """What a run is read from; its recording is derived, and may be missing."""
@@ -68,7 +74,34 @@ def read(path: Path) -> StoredRun:
             f"{path / 'rollout.parquet'}: a run of {scenario.duration:g} s at "
             f"{scenario.sim.timestep:g} s has {scenario.steps} rows, got {rows}"
         )
-    return StoredRun(path, scenario, record, _metrics(path / "metrics.json"))
+    _check_plausible(path / "rollout.parquet", record, scenario.sim.timestep)
+    grounded = isinstance(scenario.scene, Ground)
+    metrics = stored_metrics.read(path / "metrics.json", grounded=grounded)
+    return StoredRun(path, scenario, record, metrics)
+
+
+def _check_plausible(file: Path, record: Record, timestep: float) -> None:
+    """Raise unless the numbers of a record are such as a run gives: no arithmetic overflows.
+
+    Raises:
+        RunDirectoryError: Names the file, the column, the row, and the legal range.
+    """
+    due = (np.arange(len(record["time"])) + 1) * timestep
+    late = np.abs(record["time"] - due) > 0.5 * timestep
+    if late.any():
+        k = int(np.argmax(late))
+        raise RunDirectoryError(
+            f"{file}: column time must be {due[k]:g} s in row {k}, got {record['time'][k]:g}"
+        )
+    for name, column in record.items():
+        most = next((high for part, high in MOST.items() if name.startswith(part)), LARGEST)
+        far = np.abs(column) > most
+        if far.any():
+            k = int(np.argmax(far))
+            raise RunDirectoryError(
+                f"{file}: column {name} must be in [{-most:g}, {most:g}], got {column[k]:g} in "
+                f"row {k}"
+            )
 
 
 def _own_columns(scenario: Scenario) -> list[str]:
@@ -108,16 +141,3 @@ def _record(file: Path) -> Record:
         if not np.isfinite(record[name]).all():
             raise RunDirectoryError(f"{file} is no record: column {name} is not finite")
     return record
-
-
-def _metrics(file: Path) -> dict[str, Any]:
-    """Return what metrics.json says."""
-    try:
-        metrics = json.loads(file.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise RunDirectoryError(f"cannot read {file}: {error.strerror or error}") from None
-    except (ValueError, RecursionError) as error:
-        raise RunDirectoryError(f"{file} is not JSON: {error}") from None
-    if not isinstance(metrics, dict) or metrics.get("verdict") not in ("pass", "fail"):
-        raise RunDirectoryError(f"{file} has no verdict: it must be 'pass' or 'fail'")
-    return metrics

@@ -83,7 +83,16 @@ def _shortened(run: Path) -> None:
             lambda run: _without(run, "ground_z"),
             "no record of the scene 'rail': it lacks the column",
         ),
-        (lambda run: (run / "metrics.json").write_text("{}"), "metrics.json has no verdict"),
+        (
+            lambda run: _changed(run, "foot_x", 1e200),
+            "foot_x must be in [-1e+100, 1e+100], got 1e+200",
+        ),
+        (
+            lambda run: _changed(run, "torque_E", -2e9),
+            "torque_E must be in [-1e+09, 1e+09], got -2e",
+        ),
+        (lambda run: _changed(run, "theta_dot_B", 2e4), "theta_dot_B must be in [-10000, 10000], "),
+        (lambda run: _changed(run, "time", 9.0), "column time must be 0.004 s in row 3, got 9"),
         (lambda run: (run / "metrics.json").unlink(), "is no run directory: it lacks metrics.json"),
         (lambda run: (run / "scenario.toml").write_text("x = 1"), "is no run that can be read: "),
         (shutil.rmtree, "is no run directory: no such directory"),

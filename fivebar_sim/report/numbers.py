@@ -1,75 +1,23 @@
-"""What a page says in numbers beyond the metrics, and whether the metrics are all there."""
+"""What a page says in numbers beyond the metrics."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from fivebar_sim import guards, tables
+from fivebar_sim import tables
 from fivebar_sim.arrays import Array
 from fivebar_sim.catalogue import GROUND_KEYS, SHOWN
-from fivebar_sim.checks import is_finite
 from fivebar_sim.control import Feedback
-from fivebar_sim.errors import RunDirectoryError
-from fivebar_sim.limits import Limit, judge, look_up
+from fivebar_sim.limits import Limit, judge
 from fivebar_sim.recording_series import SHARE_WINDOW, load_share
 from fivebar_sim.stored_run import StoredRun
 from fivebar_sim.tracking import tracking_error
 
 PERCENTILE = 95.0
 """Of the tracking error, beside its RMS."""
-
-
-def check(run: StoredRun) -> None:
-    """Raise unless the metrics of a run are those that its page shows.
-
-    Raises:
-        RunDirectoryError: A metric is missing or no number; names the file and the key.
-    """
-    file = run.path / "metrics.json"
-    if "guards" not in run.metrics:
-        raise RunDirectoryError(f"{file} has no guards: run its scenario.toml again")
-    try:
-        guards.tripped(run.metrics["guards"])
-    except (KeyError, TypeError, ValueError):
-        raise RunDirectoryError(f"{file}: guards are not those of a run") from None
-    for key in keys(run):
-        try:
-            value = look_up(run.metrics, key)
-        except (KeyError, TypeError):
-            raise RunDirectoryError(f"{file} lacks the metric {key}") from None
-        if value is not None and not is_finite(value):
-            raise RunDirectoryError(f"{file}: {key} must be a number, got {value!r}")
-    for key in ("branch", "provenance"):
-        if not isinstance(run.metrics.get(key), Mapping):
-            raise RunDirectoryError(f"{file} lacks the table {key}")
-    numbers = [run.metrics["branch"].get("first_flip"), *_phase(run, file)]
-    bad = [value for value in numbers if value is not None and not is_finite(value)]
-    if bad:
-        raise RunDirectoryError(f"{file}: first_flip and phase must be numbers, got {bad[0]!r}")
-
-
-def _phase(run: StoredRun, file: Path) -> list[Any]:
-    """Return all that is said of the load over the cycle.
-
-    Raises:
-        RunDirectoryError: It is not one list of share_A and of either torque_rms, of one length.
-    """
-    phase = run.metrics["load"].get("phase")
-    if phase is None:
-        return []
-    try:
-        lists = [phase["share_A"], phase["torque_rms"]["A"], phase["torque_rms"]["E"]]
-        share, A, E = (list(each) for each in lists)
-    except (KeyError, TypeError):
-        raise RunDirectoryError(f"{file}: load.phase is not share_A and torque_rms") from None
-    if not len(share) == len(A) == len(E):
-        raise RunDirectoryError(f"{file}: the lists of load.phase must be of one length")
-    return [*share, *A, *E]
 
 
 def name_of(run: StoredRun) -> str:

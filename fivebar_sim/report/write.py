@@ -8,7 +8,7 @@ from pathlib import Path
 
 from fivebar_sim import stored_run, whole_file
 from fivebar_sim.errors import ArgumentError, RunDirectoryError
-from fivebar_sim.report import comparison, look, numbers, single
+from fivebar_sim.report import comparison, look, single
 
 
 def place_of(runs: Sequence[Path]) -> Path:
@@ -39,8 +39,6 @@ def write(runs: Sequence[Path], out: Path | None = None, png: Path | None = None
     if place.is_dir():
         raise RunDirectoryError(f"cannot write {place}: a directory is there")
     read = [stored_run.read(path) for path in runs]
-    for run in read:
-        numbers.check(run)
     files: dict[Path, bytes] = {}
     with look.styled():
         drawn = single.figures(read[0]) if len(read) == 1 else comparison.figures(read)

@@ -1,0 +1,257 @@
+"""What metrics.json may say: every key with its type and range, checked once, for every reader."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import msgspec
+
+from fivebar_sim import guards, input_file, tables
+from fivebar_sim.errors import RunDirectoryError, unknown
+from fivebar_sim.catalogue import LIMIT_KEYS
+
+LARGEST = 1e100
+"""No metric is larger: what is done with one cannot overflow."""
+
+Number = Annotated[float, msgspec.Meta(ge=-LARGEST, le=LARGEST)] | None
+"""None where it is undefined."""
+Amount = Annotated[float, msgspec.Meta(ge=0, le=LARGEST)] | None
+Part = Annotated[float, msgspec.Meta(ge=0, le=1)] | None
+Count = Annotated[int, msgspec.Meta(ge=0, le=2**53)]
+Sign = Annotated[int, msgspec.Meta(ge=-1, le=1)]
+
+
+class Table(msgspec.Struct, forbid_unknown_fields=True):
+    """A table whose keys are all known."""
+
+
+class Error(Table):
+    """Of "tracking" and "closure" [m]."""
+
+    rms: Amount
+    max: Amount
+
+
+class Motors(Table):
+    """An amount of either motor."""
+
+    A: Amount
+    E: Amount
+
+
+class Parts(Table):
+    """A part of the steps of either motor."""
+
+    A: Part
+    E: Part
+
+
+class Work(Table):
+    """What a motor did [J]."""
+
+    positive: Number
+    negative: Number
+    net: Number
+
+
+class Works(Table):
+    """What both motors did."""
+
+    A: Work
+    E: Work
+
+
+class Opposing(Table):
+    """One motor against the other."""
+
+    fraction: Part
+    first: Amount
+    energy: Amount
+
+
+class Share(Table):
+    """The load over some of the steps; see `load.measure`."""
+
+    torque_rms: Motors
+    torque_peak: Motors
+    share_A: Part
+    thermal_share_A: Part
+    peak_ratio: Amount
+    rms_ratio: Amount
+    work: Works
+    opposing: Opposing
+
+
+class Bins(Table):
+    """Of either motor, an amount in every bin."""
+
+    A: list[Amount]
+    E: list[Amount]
+
+
+class Phase(Table):
+    """The load over the gait's cycle."""
+
+    share_A: list[Part]
+    torque_rms: Bins
+
+    def __post_init__(self) -> None:
+        if not len(self.share_A) == len(self.torque_rms.A) == len(self.torque_rms.E):
+            raise ValueError("the lists must be of one length")
+
+
+class Load(Share):
+    """The load over the measured time."""
+
+    saturated: Parts
+    stance: Share | msgspec.UnsetType = msgspec.UNSET
+    phase: Phase | msgspec.UnsetType = msgspec.UNSET
+
+
+class Energy(Table):
+    """See `energy.measure` [J]."""
+
+    motor: Number
+    force: Number
+    ground: Number
+    constraints: Number
+    step: Number
+    kinetic: Number
+    potential: Number
+    turnover: Amount
+    imbalance: Amount
+
+
+class Branch(Table):
+    """Which way the leg is folded, and when it first left that [s]."""
+
+    working_mode: tuple[Sign, Sign]
+    assembly: Sign
+    flips: Count
+    first_flip: Amount
+
+
+class Guard(Table):
+    """See `guards.Guard`."""
+
+    name: str
+    value: Number
+    high: Annotated[float, msgspec.Meta(ge=0, le=LARGEST)]
+    time: Amount
+    ok: bool
+
+    def __post_init__(self) -> None:
+        if self.name not in guards.SAID:
+            raise ValueError(unknown("guard", self.name, guards.SAID))
+        if self.ok != (self.time is None):
+            raise ValueError(f"ok must be {str(not self.ok).lower()} with time {self.time}")
+
+
+class Limit(Table):
+    """See `metrics.Limit`."""
+
+    key: str
+    low: Number
+    high: Number
+    value: Number
+    ok: bool
+
+    def __post_init__(self) -> None:
+        if self.key not in LIMIT_KEYS:
+            raise ValueError(unknown("metric", self.key, LIMIT_KEYS))
+
+
+class Force(Table):
+    """Largest forces of the ground [N]."""
+
+    x: Number
+    z: Number
+
+
+class Ground(Table):
+    """See `ground.measure`."""
+
+    force_max: Force
+    stance_share: Part
+    slip: Amount
+    foot_height_max: Number
+    flight_max: Amount
+
+
+class Metrics(Table):
+    """All of metrics.json."""
+
+    tracking: Error
+    closure: Error
+    load: Load
+    energy: Energy
+    branch: Branch
+    guards: list[Guard]
+    warnings: Count
+    verdict: Literal["pass", "fail"]
+    limits: list[Limit]
+    provenance: dict[str, str | int | float | None]
+    ground: Ground | msgspec.UnsetType = msgspec.UNSET
+
+
+def read(file: Path, *, grounded: bool) -> dict[str, Any]:
+    """Return what metrics.json says, found to be what a run says.
+
+    Args:
+        file: Where it is.
+        grounded: Whether the run was in a scene with a ground, which has metrics of its own.
+
+    Raises:
+        RunDirectoryError: It cannot be read, is no JSON, lacks a key, has an unknown one, or a
+            value that no run has; names the file and the key.
+    """
+    try:
+        input_file.check(file, input_file.TEXT)
+        metrics = json.loads(file.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise RunDirectoryError(f"cannot read {file}: {error.strerror or error}") from None
+    except (ValueError, RecursionError) as error:
+        raise RunDirectoryError(f"{file} is not JSON: {error}") from None
+    if tables.is_deep(metrics):
+        raise RunDirectoryError(f"{file} is not of a run: nested too deep")
+    try:
+        msgspec.convert(metrics, Metrics)
+    except msgspec.ValidationError as error:
+        raise RunDirectoryError(f"{file}: {_explain(str(error), metrics)}") from None
+    if grounded != ("ground" in metrics):
+        which = "lacks" if grounded else "must not have"
+        raise RunDirectoryError(f"{file}: a run of this scene {which} the key ground")
+    return metrics
+
+
+def _explain(message: str, metrics: Any) -> str:
+    """Return msgspec's message with the key in front and what came behind."""
+    text, _, at = message.partition(" - at `$")
+    key = at.rstrip("`").lstrip(".")
+    missing = re.fullmatch(r"Object (missing required|contains unknown) field `(.+)`", text)
+    if missing:
+        dotted = f"{key}.{missing[2]}".lstrip(".")
+        if missing[1] == "contains unknown":
+            return f"unknown key {dotted}"
+        return f"{dotted} is missing: run its scenario.toml again"
+    came = f"got {_at(metrics, key)!r:.60}"
+    name = key or "the file"
+    if text.startswith("Invalid enum value"):
+        return f"{name} must be 'pass' or 'fail', {came}"
+    expected = re.fullmatch(r"Expected `([^`]+)`(.*?)(, got .*)?", text)
+    if not expected:  # a table's own check
+        return f"{name}: {text}"
+    words = [tables.WORDS.get(word, word) for word in expected[1].split(" | ")]
+    return f"{name} must be {' or '.join(words)}{expected[2]}, {came}"
+
+
+def _at(value: Any, key: str) -> Any:
+    """Return what stands at a key like "guards[0].ok"."""
+    for part in re.findall(r"[^.\[\]]+", key):
+        if part == "...":  # msgspec's word for a key of any name
+            return value
+        value = value[int(part)] if isinstance(value, list) else value[part]
+    return value

@@ -1,0 +1,136 @@
+"""metrics.json read back: what no run says is refused in one line, by every command that reads."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import pytest
+from shell import Shell
+
+from fivebar_sim import rollout, scenes, stored_metrics
+from fivebar_sim.errors import RunDirectoryError
+from fivebar_sim.scenario import Scenario
+
+
+class Kept(NamedTuple):
+    """What a run's metrics.json says, and whether its scene has a ground."""
+
+    text: str
+    grounded: bool
+
+
+@pytest.fixture(scope="module")
+def kept() -> list[Kept]:
+    sources = [("classic-ellipse", 0.8), ("q8bot-trot", 2.1), ("rail-landing", 0.8)]
+    runs = [rollout.run(Scenario.load(name, [f"duration={t}"])) for name, t in sources]
+    return [
+        Kept(json.dumps(run.metrics), isinstance(run.scenario.scene, scenes.Ground)) for run in runs
+    ]
+
+
+def _saved(folder: Path, content: Any) -> Path:
+    file = folder / "metrics.json"
+    file.write_text(content if isinstance(content, str) else json.dumps(content))
+    return file
+
+
+def _holders(value: Any) -> list[tuple[Any, Any]]:
+    """Return (table or list, key) of everything at any depth."""
+    if not isinstance(value, (dict, list)):
+        return []
+    pairs = list(value.items()) if isinstance(value, dict) else list(enumerate(value))
+    return [found for key, inner in pairs for found in [(value, key), *_holders(inner)]]
+
+
+def test_what_a_run_writes_is_read(kept: list[Kept], tmp_path: Path) -> None:
+    for text, grounded in kept:
+        read = stored_metrics.read(_saved(tmp_path, text), grounded=grounded)
+        assert read == json.loads(text)
+
+
+def test_everything_is_needed_and_nothing_else_is_known(kept: list[Kept], tmp_path: Path) -> None:
+    """Every key of every table, taken away or exchanged for what is nothing, is missed."""
+    for text, grounded in kept:
+        places = len(_holders(json.loads(text)))
+        for which in range(places):
+            for value in (None, {"x": 1}, [[]], True, "\x1b[31m", -1e300, float("nan")):
+                metrics = json.loads(text)
+                holder, key = _holders(metrics)[which]
+                said_of = isinstance(holder, dict) and "mujoco" in holder
+                if said_of or (key == "provenance" and value == {"x": 1}):
+                    continue  # provenance may say anything
+                holder[key] = value
+                if value is None and isinstance(holder, dict):
+                    del holder[key]
+                if (key, value) in (("ok", True), ("stance", None), ("phase", None)):
+                    continue  # so it may be
+                if value is None and isinstance(holder, list):
+                    continue  # undefined in this bin
+                with pytest.raises(RunDirectoryError, match=r"metrics.json: .*\S"):
+                    stored_metrics.read(_saved(tmp_path, metrics), grounded=grounded)
+
+
+def _guard(**changes: Any) -> Callable[[Any], object]:
+    return lambda metrics: metrics["guards"][1].update(changes)
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (
+            lambda m: m["guards"][1].pop("ok"),
+            "guards[1].ok is missing: run its scenario.toml again",
+        ),
+        (lambda m: m.pop("guards"), "guards is missing: run its scenario.toml again"),
+        (lambda m: m.pop("provenance"), "provenance is missing: run its scenario.toml again"),
+        (_guard(ok=False), "guards[1]: ok must be true with time None"),
+        (_guard(name="loo"), "guards[1]: unknown guard 'loo'; known: "),
+        (_guard(high="x"), "guards[1].high must be a number, got 'x'"),
+        (
+            lambda m: m["load"].update(share_A=1.5),
+            "load.share_A must be a number <= 1.0, got 1",
+        ),
+        (lambda m: m.update(tracking=3), "tracking must be a table, got 3"),
+        (lambda m: m.update(verdict="PASS"), "verdict must be 'pass' or 'fail', got 'PASS'"),
+        (lambda m: m.update(more=1), "unknown key more"),
+        (lambda m: m.update(ground={}), "ground.force_max is missing"),
+        (
+            lambda m: m["closure"].update(rms="big"),
+            "closure.rms must be a number or null, got 'big'",
+        ),
+        (
+            lambda m: m["closure"].update(rms=1e300),
+            "closure.rms must be a number <= 1e+100",
+        ),
+    ],
+)
+def test_refusals_name_file_key_and_what_is_legal(
+    kept: list[Kept], tmp_path: Path, change: Callable[[Any], object], said: str
+) -> None:
+    metrics = json.loads(kept[0].text)
+    change(metrics)
+    file = _saved(tmp_path, metrics)
+    with pytest.raises(RunDirectoryError) as caught:
+        stored_metrics.read(file, grounded=False)
+    assert str(caught.value).startswith(f"{file}: {said}")
+
+
+def test_metrics_of_another_scene_are_refused(kept: list[Kept], tmp_path: Path) -> None:
+    for (text, grounded), said in ((kept[0], "lacks"), (kept[2], "must not have")):
+        with pytest.raises(RunDirectoryError, match=f"a run of this scene {said} the key ground$"):
+            stored_metrics.read(_saved(tmp_path, text), grounded=not grounded)
+
+
+def test_every_reader_refuses_alike(shell: Shell) -> None:
+    for name in ("mine", "other"):
+        assert shell("run", "short.toml", "--quiet", "--out", name).status == 0
+    metrics = json.loads(Path("mine/metrics.json").read_text())
+    del metrics["guards"][0]["ok"]
+    _saved(Path("mine"), metrics)
+    commands = ["report mine", "report other mine", "replay mine", "replay other mine --web"]
+    for command in [*commands, "render mine"]:
+        said = shell.refused(*command.split())
+        assert said.startswith("mine/metrics.json: guards[0].ok is missing")
