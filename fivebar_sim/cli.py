@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import functools
 import importlib
 import io
 import os
 import sys
 from collections.abc import Callable, Sequence
 from importlib.metadata import version
+from typing import Any
 
-from fivebar_sim import memory, signals
+from fivebar_sim import memory, plain, signals
 from fivebar_sim.commands.status import FAILED, INTERRUPTED, UNREAD, WRONG, say
 from fivebar_sim.errors import DivergedError, FiveBarError
 
@@ -24,6 +26,12 @@ def main(argv: Sequence[str] | None = None) -> int:
     args = list(sys.argv[1:] if argv is None else argv)
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(errors="backslashreplace")  # any name, in any terminal's encoding
+    with plain.output():
+        return _main(args)
+
+
+def _main(args: list[str]) -> int:
+    """Call the command; say in one line what is wrong."""
     try:
         with signals.heard():
             status = _call(args)
@@ -59,6 +67,7 @@ def _call(args: list[str]) -> int:
         memory.check()
     import tyro
 
+    plain.style(allowed=all(arg.isprintable() for arg in args))  # the parser quotes them
     return tyro.extras.subcommand_cli_from_dict(
         {name: _command(name) for name in COMMANDS},
         prog="fivebar",
@@ -69,5 +78,12 @@ def _call(args: list[str]) -> int:
 
 
 def _command(name: str) -> Callable[..., int]:
-    """Return the function of a command."""
-    return getattr(importlib.import_module(f"fivebar_sim.commands.{name}"), name)
+    """Return the function of a command; what it prints is plain."""
+    function = getattr(importlib.import_module(f"fivebar_sim.commands.{name}"), name)
+
+    @functools.wraps(function)
+    def command(*args: Any, **options: Any) -> int:
+        plain.style(allowed=False)
+        return function(*args, **options)
+
+    return command

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+import sys
+from collections.abc import Iterable, Iterator, Sequence
 from typing import TYPE_CHECKING, Annotated
 
 from tyro.conf import Positional, UseAppendAction, arg
 
-from fivebar_sim import memory
+from fivebar_sim import memory, plain
 from fivebar_sim.errors import ConfigError, FiveBarError
 
 if TYPE_CHECKING:
@@ -34,20 +35,30 @@ def plans_of(scenarios: Iterable[str], settings: Sequence[str]) -> list[Plan]:
     return plans
 
 
-def screen():
-    """Return a console for stdout; a reader that has gone raises BrokenPipeError."""
-    from rich.console import Console
+def screen(*, stderr: bool = False, quiet: bool = False):
+    """Return a console for stdout, or stderr; a reader that has gone raises BrokenPipeError.
+
+    What is printed is plain before it gets its colours, and no word becomes a picture.
+    """
+    from rich.console import Console, ConsoleOptions, RenderableType
+    from rich.segment import Segment
 
     class Screen(Console):
         def on_broken_pipe(self) -> None:  # rich itself would exit with 1, as if a limit failed
             raise BrokenPipeError
 
-    return Screen()
+        def render(
+            self, renderable: RenderableType, options: ConsoleOptions | None = None
+        ) -> Iterator[Segment]:
+            for part in super().render(renderable, options):
+                yield part if part.control else part._replace(text=plain.plain(part.text))
+
+    stream = plain.behind(sys.stderr if stderr else sys.stdout)
+    return Screen(file=stream, quiet=quiet, emoji=False)
 
 
 def working(what: str, *, quiet: bool):
     """Return a context that shows a spinner on a terminal's stderr."""
-    from rich.console import Console
     from rich.text import Text
 
-    return Console(stderr=True, quiet=quiet).status(Text(what))
+    return screen(stderr=True, quiet=quiet).status(Text(what))

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import sys
 
+from fivebar_sim.plain import plain
+
 FAILED, WRONG, INTERRUPTED, UNREAD = 1, 2, 130, 141
 
 HEAD, TAIL = 400, 190
@@ -17,6 +19,5 @@ def say(error: BaseException | str) -> None:
 
 def one_line(text: str) -> str:
     """Return a text on one line: what cannot be printed is told with backslashes."""
-    line = " ".join(text.split())
-    line = "".join(c if c.isprintable() else ascii(c)[1:-1] for c in line)
+    line = plain(" ".join(text.split()))
     return line if len(line) <= HEAD + TAIL + 10 else f"{line[:HEAD]} ... {line[-TAIL:]}"
