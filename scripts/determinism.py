@@ -1,10 +1,11 @@
 """./.venv/bin/python scripts/determinism.py [MUJOCO ...]: how far metrics move elsewhere.
 
-Runs all shipped scenarios as `fivebar check` does, then by plain mj_step, here and with other
-versions of MuJoCo (3.16.0 and 4.0.0, if none is named), each installed over the network into a
-virtual environment of its own that has everything else from this one. Prints for every metric the
-scenario where it moves most, beside what its baseline allows; exit status 1 where that is passed,
-2 where a version cannot be installed or run.
+Runs all shipped scenarios as `fivebar check` does, then by plain mj_step, as older processors
+would compute (scripts/determinism_processor.py), and with other versions of MuJoCo (3.16.0 and
+4.0.0, if none is named), each installed over the network into a virtual environment of its own that
+has everything else from this one. Prints for every metric the scenario where it moves most, beside
+what its baseline allows; exit status 1 where that is passed, 2 where a version cannot be installed
+or run.
 """
 
 from __future__ import annotations
@@ -27,6 +28,7 @@ from rich.table import Table
 
 ROOT = Path(__file__).resolve().parent.parent
 WORKER = Path(__file__).resolve().parent / "determinism_runs.py"
+PROCESSORS = Path(__file__).resolve().parent / "determinism_processor.py"
 VERSIONS = ("3.16.0", "4.0.0")
 CONSOLE = Console(width=110)
 
@@ -49,18 +51,28 @@ class UnusableError(Exception):
     """An environment that cannot be made, or in which nothing runs."""
 
 
-def measured(python: Path | str, *, plain: bool) -> Runs:
+def measured(python: Path | str, *, plain: bool, settings: dict[str, str] | None = None) -> Runs:
     """Return what all shipped scenarios come to in an environment.
 
     Args:
         python: Its interpreter.
         plain: By mj_step, one scenario after the other, and not as one batch.
+        settings: More environment variables.
     """
     command = [str(python), str(WORKER), *(["--plain"] if plain else [])]
-    done = subprocess.run(command, capture_output=True, text=True, check=False, cwd=ROOT)
+    env = {**os.environ, **(settings or {})}
+    done = subprocess.run(command, capture_output=True, text=True, check=False, cwd=ROOT, env=env)
     if done.returncode:
         raise UnusableError(f"the scenarios do not run with it: {last_line(done.stderr)}")
     return json.loads(done.stdout)
+
+
+def processors() -> dict[str, dict[str, str]]:
+    """Return the settings of each older processor that this one can stand in for."""
+    command = [sys.executable, str(PROCESSORS)]
+    done = subprocess.run(command, stdout=subprocess.PIPE, text=True, check=True)
+    lines = [line.split("\t") for line in done.stdout.splitlines()]
+    return {title: dict(each.split("=", 1) for each in settings) for title, *settings in lines}
 
 
 def environment(folder: Path, version: str) -> Path:
@@ -161,6 +173,9 @@ def main(versions: list[str]) -> int:
     with tempfile.TemporaryDirectory() as place:
         here = measured(sys.executable, plain=False)
         good = show("plain mj_step, here", here, measured(sys.executable, plain=True))
+        for name, settings in processors().items():
+            there = measured(sys.executable, plain=False, settings=settings)
+            good &= show(f"processor: {name}", here, there)
         for version in versions:
             python = environment(Path(place) / version, version)
             there = measured(python, plain=True)

@@ -94,11 +94,40 @@ def test_beyond_the_tolerance_is_status_1(
     capsys: pytest.CaptureFixture[str], there: float | None, status: int
 ) -> None:
     main = runpy.run_path(str(SCRIPTS / "determinism.py"))["main"]
-    main.__globals__["measured"] = lambda _, plain: runs(there, "x") if plain else runs(1e-3)
+    main.__globals__["measured"] = lambda _, plain, settings=None: (
+        runs(there, "x") if plain else runs(1e-3)
+    )
     assert main([]) == status
     said = capsys.readouterr().out
     assert "plain mj_step, here: 1 of 2 scenarios have the same bits" in said
     assert ("beyond the tolerance: two (tracking.rms)" in said) == bool(status)
+
+
+@pytest.mark.parametrize("moved", [1.0005e-3, 1.002e-3])
+def test_older_processor_is_compared_too(capsys: pytest.CaptureFixture[str], moved: float) -> None:
+    main = runpy.run_path(str(SCRIPTS / "determinism.py"))["main"]
+    main.__globals__["processors"] = lambda: {"oldest": {"FEATURES": "off"}}
+    main.__globals__["measured"] = lambda _, plain, settings=None: (
+        runs(moved, "x") if settings == {"FEATURES": "off"} else runs(1e-3)
+    )
+    assert main([]) == int(moved > 1.001e-3)
+    assert "processor: oldest: 1 of 2 scenarios have the same bits" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("asked", "status"),
+    [({"NPY_DISABLE_CPU_FEATURES": "AVX"}, 1), ({"OPENBLAS_CORETYPE": "x"}, 1), ({}, 0)],
+)
+def test_setting_without_effect_is_status_1(
+    monkeypatch: pytest.MonkeyPatch, asked: dict[str, str], status: int
+) -> None:
+    verify = runpy.run_path(str(SCRIPTS / "determinism_processor.py"))["verify"]
+    verify.__globals__["dispatched"] = lambda: ["AVX"]
+    for name in ("NPY_DISABLE_CPU_FEATURES", "OPENBLAS_CORETYPE"):
+        monkeypatch.delenv(name, raising=False)
+    for name, value in asked.items():
+        monkeypatch.setenv(name, value)
+    assert verify() == status
 
 
 def test_version_that_does_not_exist_is_one_line() -> None:
