@@ -116,14 +116,20 @@ def test_older_processor_is_compared_too(capsys: pytest.CaptureFixture[str], mov
 
 @pytest.mark.parametrize(
     ("asked", "status"),
-    [({"NPY_DISABLE_CPU_FEATURES": "AVX"}, 1), ({"OPENBLAS_CORETYPE": "x"}, 1), ({}, 0)],
+    [
+        ({"NPY_DISABLE_CPU_FEATURES": "AVX"}, 1),
+        ({"OPENBLAS_CORETYPE": "x"}, 1),
+        ({"GLIBC_TUNABLES": "glibc.cpu.hwcaps="}, 1),
+        ({}, 0),
+    ],
 )
 def test_setting_without_effect_is_status_1(
     monkeypatch: pytest.MonkeyPatch, asked: dict[str, str], status: int
 ) -> None:
     verify = runpy.run_path(str(SCRIPTS / "determinism_processor.py"))["verify"]
     verify.__globals__["dispatched"] = lambda: ["AVX"]
-    for name in ("NPY_DISABLE_CPU_FEATURES", "OPENBLAS_CORETYPE"):
+    verify.__globals__["libm"] = lambda: verify.__globals__["libm_under"]("")
+    for name in ("NPY_DISABLE_CPU_FEATURES", "OPENBLAS_CORETYPE", "GLIBC_TUNABLES"):
         monkeypatch.delenv(name, raising=False)
     for name, value in asked.items():
         monkeypatch.setenv(name, value)
