@@ -13,6 +13,9 @@ from fivebar_sim.kinematics import Points
 from fivebar_sim.kinematics.planar import cross, turned
 
 RIGID = FiveBar(0.05, 0.04, 0.035, 0.07, 0.09, 0.02, 0.5, 0.3)  # nothing equal; has all branches
+LINE = FiveBar(0.25, 0.5, 0.5, 0.25, 0.5)
+"""A leg with B, C and D in line at (pi, 0)."""
+
 RIGHT = FiveBar(0.03, 0.04, 0.04, 0.03, 0.06)  # has poses of 3-4-5 triangles
 BATCHES = [(), (1,), (3, 1, 4)]
 

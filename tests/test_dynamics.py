@@ -10,7 +10,7 @@ import mujoco
 import numpy as np
 import oracle
 import pytest
-from poses import BATCHES, RIGHT, RIGID, sample
+from poses import BATCHES, LINE, RIGHT, RIGID, sample
 
 from fivebar_sim import dynamics, kinematics, model, resources, singularity
 from fivebar_sim.arrays import Array
@@ -20,9 +20,7 @@ from fivebar_sim.kinematics import JointMotion
 
 ASKEW = (2.5, -9.0)
 """Gravity along no axis [m/s^2]."""
-PRESETS = {
-    name: replace(FiveBar.load(name), gravity=ASKEW) for name in resources.shipped("models/legs")
-}
+PRESETS = {n: replace(FiveBar.load(n), gravity=ASKEW) for n in resources.shipped("models/legs")}
 HEAVY = FiveBar(  # nothing equal, nothing in the middle of a link
     *(0.05, 0.04, 0.035, 0.07, 0.09, 0.02, 0.5, 0.3),
     mass=(0.03, 0.05, 0.02, 0.07),
@@ -33,7 +31,6 @@ HEAVY = FiveBar(  # nothing equal, nothing in the middle of a link
 )
 LEGS = {**PRESETS, "rigid": replace(RIGID, gravity=ASKEW), "heavy": HEAVY}
 EACH = pytest.mark.parametrize("leg", LEGS.values(), ids=LEGS)
-LINE = FiveBar(0.25, 0.5, 0.5, 0.25, 0.5)
 IN_LINE = (math.pi, 0.0)
 LOAD = 0.2  # payload [kg]
 

@@ -284,8 +284,6 @@ def test_phase_just_below_one_is_in_the_last_bin(bins: int) -> None:
         (r"bins must be .*, got 2.5", ONE, TWO, {"phase": [0.0], "bins": 2.5}),
     ],
 )  # fmt: skip
-def test_bad_input_is_refused_by_name(
-    message: str, torque: ArrayLike, theta: ArrayLike, more: dict[str, Any]
-) -> None:
+def test_refusal(message: str, torque: ArrayLike, theta: ArrayLike, more: dict[str, Any]) -> None:
     with pytest.raises(ArgumentError, match=message):
         load.measure(torque, theta, **{"timestep": H, **more})

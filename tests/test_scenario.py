@@ -282,13 +282,11 @@ def test_leg_file_is_checked_by_itself(tmp_path: Path) -> None:
 def test_path_that_ends_before_the_run_is_refused(tmp_path: Path) -> None:
     (tmp_path / "foot.csv").write_text(CSV, encoding="utf-8")
     csv = ["path.kind=csv", "path.file=foot.csv"]
-    assert refused(tmp_path, *csv, "duration=1") == (
-        "duration must be at most the path's 0.65 s, got 1 s"
-    )
+    beyond = refused(tmp_path, *csv, "duration=1")
+    assert beyond == "duration must be at most the path's 0.65 s, got 1 s"
     # nine steps of 0.07 s, as the duration is rounded to, are longer than the path
-    assert refused(tmp_path, *csv, "path.ramp=0", "sim.timestep=0.07").startswith(
-        "duration must be at most"
-    )
+    beyond = refused(tmp_path, *csv, "path.ramp=0", "sim.timestep=0.07")
+    assert beyond.startswith("duration must be at most")
 
 
 def test_unknown_source_is_refused(tmp_path: Path) -> None:

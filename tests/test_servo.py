@@ -290,11 +290,8 @@ def test_refusal_names_file_and_key(tmp_path: Path) -> None:
         (path := tmp_path / "mine.toml").write_text(text, encoding="utf-8")
         with pytest.raises(ConfigError, match=f"mine.toml.*{message}"):
             Servo.load(path)
-    for name, message in [
-        ("xl33", "unknown servo preset 'xl33'"),
-        ("no.toml", "cannot read servo"),
-    ]:
-        with pytest.raises(ConfigError, match=message):
+    for name, said in [("xl33", "unknown servo preset 'xl33'"), ("no.toml", "cannot read servo")]:
+        with pytest.raises(ConfigError, match=said):
             Servo.load(name)
     with pytest.raises(ArgumentError, match="unknown drive 'speed'; known: position, torque"):
         model.build(LEG, drive="speed")  # pyright: ignore[reportArgumentType]

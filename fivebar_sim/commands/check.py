@@ -44,7 +44,7 @@ def check(
             replaced when its scenario fails again, and never deleted.
         quiet: Print nothing but errors.
     """
-    from fivebar_sim import baseline, check_report, console, resources, whole_file
+    from fivebar_sim import baseline, console, resources
 
     _check_options(keep, updates_changed=update and bool(settings))
     sources = scenarios or tuple(resources.shipped("scenarios"))
@@ -61,11 +61,18 @@ def check(
     status = max(_keep(each, result, keep) for each, result in zip(checked, results, strict=True))
     if not quiet:
         console.print_check(checked, screen())
+    _publish(checked, junit, summary)
+    return status
+
+
+def _publish(checked: list[Checked], junit: Path | None, summary: Path | None) -> None:
+    """Write the verdicts for a CI job, where it asked for them."""
+    from fivebar_sim import check_report, whole_file
+
     if junit is not None:
         whole_file.write(junit, check_report.junit(checked))
     if summary is not None:
         whole_file.append(summary, check_report.markdown(checked))
-    return status
 
 
 def _check_options(keep: Path, *, updates_changed: bool) -> None:
