@@ -8,7 +8,8 @@ the value is recorded anew. The defaults stand far above what differs without an
 far below what a change of the leg, the gains or the timing does. Measured on the shipped scenarios:
 
     again, alone, batched, on 1 or 2 threads                      the same bits
-    MuJoCo 3.16, stepped by mj_step; NumPy 2.0; AVX disabled      the same bits
+    MuJoCo 3.16, stepped by mj_step; NumPy 2.0, or without AVX    the same bits
+    a C library without fused multiplication                      1e-8, relative
     MuJoCo 4.0                                                    4e-8 at most, relative
     every command and the start off by 1e-14, relative,
         as on a processor that rounds otherwise                   a thousandth of a tolerance
