@@ -28,10 +28,10 @@ from typing import Any
 
 import msgspec
 
-from fivebar_sim import input_file, resources, tables, whole_file
 from fivebar_sim.catalogue import ABSOLUTE
 from fivebar_sim.checks import check_number
 from fivebar_sim.errors import ConfigError
+from fivebar_sim.files import input_file, resources, tables, whole_file
 from fivebar_sim.limits import look_up
 
 RELATIVE = 0.005

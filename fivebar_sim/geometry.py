@@ -17,9 +17,9 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from fivebar_sim import resources, tables
 from fivebar_sim.checks import check_number
 from fivebar_sim.errors import ConfigError, GeometryError, unknown
+from fivebar_sim.files import resources, tables
 
 Mode = tuple[int, int]
 Four = tuple[float, float, float, float]

@@ -14,9 +14,10 @@ from typing import get_args
 import mujoco
 import numpy as np
 
-from fivebar_sim import kinematics, resources
+from fivebar_sim import kinematics
 from fivebar_sim.arrays import Array
 from fivebar_sim.errors import ArgumentError, GeometryError, unknown
+from fivebar_sim.files import resources
 from fivebar_sim.geometry import LONGEST, FiveBar, Link, combined
 from fivebar_sim.integrator import CONNECT, Integrator, solref
 from fivebar_sim.kinematics.stops import stops_at_C

@@ -8,7 +8,7 @@ from functools import cache
 from importlib.metadata import version
 from typing import Any
 
-from fivebar_sim import resources
+from fivebar_sim.files import resources
 from fivebar_sim.scenario import Scenario
 
 

@@ -13,9 +13,10 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
-from fivebar_sim import gl, render_files, render_scene, whole_file
+from fivebar_sim import gl, render_files, render_scene
 from fivebar_sim.checks import check_number
 from fivebar_sim.errors import ConfigError
+from fivebar_sim.files import whole_file
 from fivebar_sim.render_files import Frame
 from fivebar_sim.render_replay import Replay, Span
 

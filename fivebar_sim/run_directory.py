@@ -12,9 +12,10 @@ from pathlib import Path
 
 import tomli_w
 
-from fivebar_sim import leftovers, recording
+from fivebar_sim import recording
 from fivebar_sim.arrays import Array
 from fivebar_sim.errors import RunDirectoryError
+from fivebar_sim.files import leftovers
 
 FILES = ("scenario.toml", "metrics.json", "rollout.parquet", "recording.rrd")
 

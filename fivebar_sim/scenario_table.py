@@ -7,17 +7,18 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from fivebar_sim import control, forces, geometry, paths, scenes, tables
+from fivebar_sim import control, forces, geometry, paths, scenes
 from fivebar_sim.checks import check_number
 from fivebar_sim.control import Feedback, Setpoints
 from fivebar_sim.errors import ArgumentError, ConfigError, unknown
+from fivebar_sim.files import tables
+from fivebar_sim.files.tables import Table
 from fivebar_sim.forces import FootForce
 from fivebar_sim.geometry import FiveBar
 from fivebar_sim.paths import FootPath
 from fivebar_sim.scenes import Scene
 from fivebar_sim.servo import Servo
 from fivebar_sim.servo import read_table as read_servo
-from fivebar_sim.tables import Table
 
 NAME = re.compile(r"""(?![. ])[^/\\:*?"<>|]+(?<! )""")
 LONGEST_NAME = 200

@@ -13,10 +13,10 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from fivebar_sim import resources, tables
 from fivebar_sim.arrays import Array, Bools
 from fivebar_sim.checks import check_number, check_step
 from fivebar_sim.errors import ArgumentError, ConfigError, unknown
+from fivebar_sim.files import resources, tables
 from fivebar_sim.integrator import Integrator
 
 Drive = Literal["position", "torque"]

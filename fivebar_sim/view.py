@@ -14,8 +14,9 @@ import glfw
 import mujoco
 import numpy as np
 
-from fivebar_sim import model, render_scene, resources, screen, tables
+from fivebar_sim import model, render_scene, screen
 from fivebar_sim.errors import ConfigError, unknown
+from fivebar_sim.files import resources, tables
 from fivebar_sim.geometry import FiveBar
 from fivebar_sim.render_replay import Replay
 from fivebar_sim.scenario import Scenario

@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from fivebar_sim import kinematics, whole_file, workspace
+from fivebar_sim import kinematics, workspace
 from fivebar_sim.arrays import Array
 from fivebar_sim.errors import ConfigError
+from fivebar_sim.files import whole_file
 from fivebar_sim.geometry import FiveBar
 from fivebar_sim.survey import Map, survey
 

@@ -75,7 +75,8 @@ def _read(model: Any, data: Any, item: Any) -> np.ndarray:
 
 def measure() -> dict[str, Any]:
     """Return the metrics of all shipped scenarios with their tolerances, and their bits."""
-    from fivebar_sim import baseline, resources, rollout
+    from fivebar_sim import baseline, rollout
+    from fivebar_sim.files import resources
     from fivebar_sim.metrics import look_up
     from fivebar_sim.scenario import Scenario
 

@@ -14,7 +14,8 @@ import sys
 import tomllib
 from pathlib import Path
 
-from fivebar_sim import resources, rollout, tables
+from fivebar_sim import rollout
+from fivebar_sim.files import resources, tables
 from fivebar_sim.metrics import Limit
 from fivebar_sim.scenario import Scenario
 

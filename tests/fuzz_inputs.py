@@ -9,7 +9,8 @@ from typing import Any
 import tomli_w
 from hypothesis import strategies as st
 
-from fivebar_sim import control, forces, geometry, paths, resources, scenario, scenes, tables
+from fivebar_sim import control, forces, geometry, paths, scenario, scenes
+from fivebar_sim.files import resources, tables
 from fivebar_sim.metrics import LIMIT_KEYS
 from fivebar_sim.sensors import Sensors
 from fivebar_sim.servo import Servo

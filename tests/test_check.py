@@ -9,7 +9,8 @@ from xml.etree import ElementTree
 import pytest
 from shell import ELLIPSE, Shell
 
-from fivebar_sim import resources, rollout, run_directory
+from fivebar_sim import rollout, run_directory
+from fivebar_sim.files import resources
 
 BASELINE = Path("baselines/short.json")
 SHIPPED = resources.shipped("scenarios")

@@ -12,9 +12,10 @@ import oracle
 import pytest
 from poses import BATCHES, LINE, RIGHT, RIGID, sample
 
-from fivebar_sim import dynamics, kinematics, model, resources, singularity
+from fivebar_sim import dynamics, kinematics, model, singularity
 from fivebar_sim.arrays import Array
 from fivebar_sim.errors import ArgumentError, LoopOpenError, SingularError
+from fivebar_sim.files import resources
 from fivebar_sim.geometry import FiveBar
 from fivebar_sim.kinematics import JointMotion
 

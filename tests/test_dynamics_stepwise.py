@@ -13,9 +13,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from poses import BATCHES, RIGID
 
-from fivebar_sim import dynamics, kinematics, model, motion, resources
+from fivebar_sim import dynamics, kinematics, model, motion
 from fivebar_sim.arrays import Array
 from fivebar_sim.errors import ArgumentError, DivergedError, SingularError
+from fivebar_sim.files import resources
 from fivebar_sim.geometry import FiveBar
 from fivebar_sim.integrator import pull
 from fivebar_sim.motion import Motion

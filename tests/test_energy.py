@@ -8,8 +8,9 @@ import mujoco
 import numpy as np
 import pytest
 
-from fivebar_sim import energy, kinematics, model, resources, rollout
+from fivebar_sim import energy, kinematics, model, rollout
 from fivebar_sim.energy import Body, Steps
+from fivebar_sim.files import resources
 from fivebar_sim.geometry import FiveBar
 from fivebar_sim.record import unrecorded
 from fivebar_sim.rollout import Plan, Result

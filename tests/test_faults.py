@@ -20,9 +20,10 @@ from faults import MODEL, Fault
 from faults_program import PROGRAM
 from shell import Shell
 
-from fivebar_sim import baseline, regression, resources, rollout
+from fivebar_sim import baseline, regression, rollout
 from fivebar_sim.arrays import Array
 from fivebar_sim.errors import FiveBarError
+from fivebar_sim.files import resources
 from fivebar_sim.metrics import look_up
 from fivebar_sim.rollout import Result
 from fivebar_sim.scenario import Scenario

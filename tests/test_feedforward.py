@@ -15,8 +15,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from controllers.servo import Servo as Law
-from fivebar_sim import dynamics, kinematics, model, motion, resources, simulate
+from fivebar_sim import dynamics, kinematics, model, motion, simulate
 from fivebar_sim.arrays import Array
+from fivebar_sim.files import resources
 from fivebar_sim.geometry import FiveBar
 from fivebar_sim.integrator import Integrator
 from fivebar_sim.paths import Csv, Ellipse, PathSpec

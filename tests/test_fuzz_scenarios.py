@@ -10,7 +10,8 @@ import pytest
 from fuzz import Bench, Law
 from shell import ELLIPSE
 
-from fivebar_sim import recording_file, resources
+from fivebar_sim import recording_file
+from fivebar_sim.files import resources
 
 CORPUS = Path(__file__).with_name("corpus")
 EXPECTED: dict[str, str] = tomllib.loads((CORPUS / "expected.toml").read_text("utf-8"))

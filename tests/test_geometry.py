@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from fivebar_sim import resources
 from fivebar_sim.errors import ConfigError, GeometryError
+from fivebar_sim.files import resources
 from fivebar_sim.geometry import MODES, FiveBar, Link, ball, capsule, combined, moved, read_table
 
 CLASSIC = FiveBar()

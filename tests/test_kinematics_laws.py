@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from poses import RIGHT, RIGID, length, pose, sample, sine
 
-from fivebar_sim import kinematics, resources
+from fivebar_sim import kinematics
 from fivebar_sim.arrays import Array
 from fivebar_sim.errors import (
     ArgumentError,
@@ -20,6 +20,7 @@ from fivebar_sim.errors import (
     SingularError,
     UnreachableError,
 )
+from fivebar_sim.files import resources
 from fivebar_sim.geometry import MODES, FiveBar, Mode
 from fivebar_sim.kinematics import planar, stops
 

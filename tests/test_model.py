@@ -6,8 +6,9 @@ import mujoco
 import numpy as np
 import pytest
 
-from fivebar_sim import kinematics, model, resources
+from fivebar_sim import kinematics, model
 from fivebar_sim.errors import ArgumentError
+from fivebar_sim.files import resources
 from fivebar_sim.geometry import FiveBar
 from fivebar_sim.servo import Servo
 

@@ -13,8 +13,8 @@ import tomli_w
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fivebar_sim import tables
 from fivebar_sim.errors import ConfigError
+from fivebar_sim.files import tables
 from fivebar_sim.paths import KINDS, FootPath, Gait, Hop, Lines, PathSpec, Sample, Step
 
 POINTS = ((0.01, -0.08), (-0.02, -0.07), (-0.02, -0.09), (0.015, -0.075))

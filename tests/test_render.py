@@ -17,9 +17,10 @@ import pytest
 from PIL import Image
 from shell import Shell
 
-from fivebar_sim import FiveBar, gl, kinematics, render, render_files, render_scene, resources
+from fivebar_sim import FiveBar, gl, kinematics, render, render_files, render_scene
 from fivebar_sim.arrays import Array
 from fivebar_sim.errors import ConfigError, RunDirectoryError
+from fivebar_sim.files import resources
 from fivebar_sim.metrics import JOINT_COLUMNS, Record
 from fivebar_sim.model import HIP_HEIGHT
 from fivebar_sim.render_replay import Replay, Span, replay

@@ -13,7 +13,8 @@ from pathlib import Path
 import pytest
 from shell import Shell
 
-from fivebar_sim import leftovers, rollout, run_directory, stored_run
+from fivebar_sim import rollout, run_directory, stored_run
+from fivebar_sim.files import leftovers
 from fivebar_sim.rollout import Result
 from fivebar_sim.scenario import Scenario
 

@@ -11,8 +11,9 @@ import numpy as np
 import pytest
 import tomli_w
 
-from fivebar_sim import resources, rollout
+from fivebar_sim import rollout
 from fivebar_sim.errors import ConfigError
+from fivebar_sim.files import resources
 from fivebar_sim.geometry import FiveBar
 from fivebar_sim.paths import Circle, Csv, Ellipse
 from fivebar_sim.scenario import MOST_STEPS, Scenario, Sim, copied_name

@@ -10,8 +10,9 @@ from pathlib import Path
 import faults_disturbed as disturbed
 import pytest
 
-from fivebar_sim import baseline, control, regression, resources, rollout, scenes
+from fivebar_sim import baseline, control, regression, rollout, scenes
 from fivebar_sim.errors import FiveBarError
+from fivebar_sim.files import resources
 from fivebar_sim.guards import Guards
 from fivebar_sim.metrics import Limit
 from fivebar_sim.rollout import Plan, Result

@@ -14,7 +14,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from fivebar_sim import resources, rollout, simulate
+from fivebar_sim import rollout, simulate
+from fivebar_sim.files import resources
 from fivebar_sim.rollout import Plan, Result
 from fivebar_sim.scenario import Scenario
 

@@ -11,8 +11,9 @@ import numpy as np
 import pytest
 from test_guards import CASES, CHATTER, hurried
 
-from fivebar_sim import resources, rollout
+from fivebar_sim import rollout
 from fivebar_sim.arrays import Array
+from fivebar_sim.files import resources
 from fivebar_sim.rollout import Plan, Result
 from fivebar_sim.scenario import Scenario
 from fivebar_sim.simulate import Legs, States

@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 from mujoco.batch import Batch
 
-from fivebar_sim import dynamics, kinematics, model, resources, rollout, scenes
+from fivebar_sim import dynamics, kinematics, model, rollout, scenes
 from fivebar_sim.errors import ArgumentError, ConfigError, GeometryError
+from fivebar_sim.files import resources
 from fivebar_sim.geometry import FiveBar
 from fivebar_sim.integrator import Integrator
 from fivebar_sim.rollout import Result

@@ -12,9 +12,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from mujoco.batch import Batch
 
-from fivebar_sim import model, motion, resources
+from fivebar_sim import model, motion
 from fivebar_sim.arrays import Array
 from fivebar_sim.errors import ArgumentError, ConfigError
+from fivebar_sim.files import resources
 from fivebar_sim.geometry import FiveBar
 from fivebar_sim.integrator import Integrator
 from fivebar_sim.paths import Ellipse

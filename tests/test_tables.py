@@ -11,8 +11,8 @@ from typing import Any, Literal
 import msgspec
 import pytest
 
-from fivebar_sim import tables
 from fivebar_sim.errors import ConfigError
+from fivebar_sim.files import tables
 
 
 class Gains(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):

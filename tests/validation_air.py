@@ -17,8 +17,9 @@ import oracle_simulation
 from mujoco.batch import Batch
 
 from controllers.servo import Servo as Law
-from fivebar_sim import dynamics, kinematics, resources, rollout
+from fivebar_sim import dynamics, kinematics, rollout
 from fivebar_sim.arrays import Array
+from fivebar_sim.files import resources
 from fivebar_sim.forces import Constant
 from fivebar_sim.geometry import FiveBar
 from fivebar_sim.integrator import Integrator

@@ -44,7 +44,8 @@ def check(
             replaced when its scenario fails again, and never deleted.
         quiet: Print nothing but errors.
     """
-    from fivebar_sim import baseline, console, resources
+    from fivebar_sim import baseline, console
+    from fivebar_sim.files import resources
 
     _check_options(keep, updates_changed=update and bool(settings))
     sources = scenarios or tuple(resources.shipped("scenarios"))
@@ -67,7 +68,8 @@ def check(
 
 def _publish(checked: list[Checked], junit: Path | None, summary: Path | None) -> None:
     """Write the verdicts for a CI job, where it asked for them."""
-    from fivebar_sim import check_report, whole_file
+    from fivebar_sim import check_report
+    from fivebar_sim.files import whole_file
 
     if junit is not None:
         whole_file.write(junit, check_report.junit(checked))
@@ -85,7 +87,7 @@ def _check_options(keep: Path, *, updates_changed: bool) -> None:
 
 def _check_places(junit: Path | None, summary: Path | None) -> None:
     """Raise where the verdicts cannot be written, before anything is simulated."""
-    from fivebar_sim import whole_file
+    from fivebar_sim.files import whole_file
 
     if junit is not None:
         whole_file.check_place(junit)

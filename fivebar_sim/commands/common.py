@@ -20,7 +20,8 @@ Settings = UseAppendAction[Annotated[tuple[str, ...], arg(name="set", metavar="K
 
 def plans_of(scenarios: Iterable[str], settings: Sequence[str]) -> list[Plan]:
     """Return the plans of all scenarios: everything is validated before the first one runs."""
-    from fivebar_sim import resources, rollout
+    from fivebar_sim import rollout
+    from fivebar_sim.files import resources
     from fivebar_sim.scenario import Scenario
 
     chosen = list(scenarios) or list(resources.shipped("scenarios"))

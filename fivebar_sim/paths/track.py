@@ -9,9 +9,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fivebar_sim import input_file
 from fivebar_sim.arrays import Array
 from fivebar_sim.errors import ConfigError, unknown
+from fivebar_sim.files import input_file
 
 Headers = Mapping[tuple[str, str, str], float]
 

@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fivebar_sim import ground, tables
+from fivebar_sim import ground
 from fivebar_sim.arrays import Array
 from fivebar_sim.catalogue import SHOWN, shown
+from fivebar_sim.files import tables
 from fivebar_sim.limits import bounds, look_up
 from fivebar_sim.recording_series import points
 from fivebar_sim.report import draw, html, numbers

@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from fivebar_sim import tables
 from fivebar_sim.arrays import Array
 from fivebar_sim.catalogue import GROUND_KEYS, SHOWN
 from fivebar_sim.control import Feedback
+from fivebar_sim.files import tables
 from fivebar_sim.limits import Limit, judge
 from fivebar_sim.recording_series import SHARE_WINDOW, load_share
 from fivebar_sim.stored_run import StoredRun

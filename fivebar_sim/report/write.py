@@ -6,8 +6,9 @@ import os
 from collections.abc import Sequence
 from pathlib import Path
 
-from fivebar_sim import stored_run, whole_file
+from fivebar_sim import stored_run
 from fivebar_sim.errors import ArgumentError, RunDirectoryError
+from fivebar_sim.files import whole_file
 from fivebar_sim.report import comparison, look, single
 
 

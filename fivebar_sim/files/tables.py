@@ -11,8 +11,8 @@ from typing import Any, TypeVar, get_args, get_type_hints
 
 import msgspec
 
-from fivebar_sim import input_file
 from fivebar_sim.errors import ConfigError, unknown
+from fivebar_sim.files import input_file
 
 T = TypeVar("T")
 Table = dict[str, Any]
