@@ -17,8 +17,8 @@ from matplotlib.axes import Axes
 from fivebar_sim import dynamics, kinematics, load
 from fivebar_sim.arrays import Array, Bools
 from fivebar_sim.geometry import FiveBar
+from fivebar_sim.kinematics.two_link import SerialLeg
 from fivebar_sim.paths import Gait
-from fivebar_sim.two_link import SerialLeg
 
 OUT = Path(__file__).resolve().parent.parent / "docs" / "load-sharing.svg"
 STEPS = 2000  # of a gait period

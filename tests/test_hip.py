@@ -10,7 +10,7 @@ import pytest
 from poses import BATCHES, LINE, RIGHT, RIGID, pose, random_leg, sample, sine
 from scipy.spatial.transform import Rotation
 
-from fivebar_sim import hip, kinematics
+from fivebar_sim import kinematics
 from fivebar_sim.arrays import Array
 from fivebar_sim.errors import (
     ArgumentError,
@@ -20,7 +20,8 @@ from fivebar_sim.errors import (
     UnreachableError,
 )
 from fivebar_sim.geometry import MODES, FiveBar
-from fivebar_sim.hip import Hip, SideStep, Steering
+from fivebar_sim.kinematics import hip
+from fivebar_sim.kinematics.hip import Hip, SideStep, Steering
 from fivebar_sim.kinematics.planar import unit, wrap
 
 EPS = float(np.finfo(float).eps)

@@ -16,7 +16,7 @@ from fivebar_sim.arrays import Array
 from fivebar_sim.errors import ArgumentError, GeometryError, SingularError, UnreachableError
 from fivebar_sim.geometry import FiveBar
 from fivebar_sim.kinematics.planar import cross, unit
-from fivebar_sim.two_link import CrouchingLeg, SerialLeg
+from fivebar_sim.kinematics.two_link import CrouchingLeg, SerialLeg
 
 EPS = float(np.finfo(float).eps)
 LEG = SerialLeg(0.05, 0.07)
