@@ -12,7 +12,7 @@ from fivebar_sim.arrays import Array
 from fivebar_sim.errors import ConfigError
 from fivebar_sim.files import whole_file
 from fivebar_sim.geometry import FiveBar
-from fivebar_sim.survey import Map, survey
+from fivebar_sim.workspace.survey import Map, survey
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

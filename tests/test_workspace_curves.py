@@ -9,9 +9,9 @@ import pytest
 from extended_legs import any_leg, around, length, narrow
 
 from fivebar_sim import singularity, workspace
-from fivebar_sim.coupler import FourBar, cut, trace
 from fivebar_sim.geometry import MODES, FiveBar, Mode
 from fivebar_sim.kinematics.planar import unit
+from fivebar_sim.workspace.coupler import FourBar, cut, trace
 
 BENT = FiveBar(0.05, 0.04, 0.035, 0.07, 0.09, 0.02, 0.5, 0.3)
 MINITAUR = FiveBar.load("minitaur")

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fivebar_sim.arrays import Array
-from fivebar_sim.coupler import Complex, FourBar, crossing
+from fivebar_sim.workspace.coupler import Complex, FourBar, crossing
 
 Rows = NDArray[np.intp]
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from fivebar_sim.arrays import Array
-from fivebar_sim.coupler import Complex, FourBar, cut, runs, trace
 from fivebar_sim.geometry import FiveBar, Mode
+from fivebar_sim.workspace.coupler import Complex, FourBar, cut, runs, trace
 
 
 def singular_pieces(leg: FiveBar, mode: Mode) -> list[Complex]:

@@ -7,9 +7,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fivebar_sim import kinematics, workspace
+from fivebar_sim import kinematics
 from fivebar_sim.arrays import Array
 from fivebar_sim.geometry import FiveBar
+from fivebar_sim.workspace import region
 
 CELLS = 241
 """Grid points along the longer side of the map."""
@@ -46,7 +47,7 @@ def survey(leg: FiveBar, cells: int = CELLS) -> Map:
     reach = 1.05 * (leg.L1 + leg.L2 + leg.L6 + float(np.hypot(*A)))
     line = np.linspace(-reach, reach, cells)
     foot = np.stack(np.meshgrid(line, line), axis=-1)
-    distance = workspace.distance(leg, foot, mode=leg.mode)
+    distance = region.distance(leg, foot, mode=leg.mode)
     within = distance > 0.0
     rows, columns = _span(np.any(within, axis=1)), _span(np.any(within, axis=0))
     return Map(line[columns], line[rows], distance[rows, columns])

@@ -17,10 +17,10 @@ from numpy.typing import ArrayLike
 from fivebar_sim.arrays import Array, Bools, as_pairs, at, first_index
 from fivebar_sim.checks import check_number
 from fivebar_sim.errors import ArgumentError
-from fivebar_sim.extended import Extended, region, to_hip
 from fivebar_sim.geometry import MODES, FiveBar, Mode
-from fivebar_sim.rings import Rings, rings
-from fivebar_sim.singular_curves import singular_pieces
+from fivebar_sim.workspace.extended import Extended, region, to_hip
+from fivebar_sim.workspace.rings import Rings, rings
+from fivebar_sim.workspace.singular import singular_pieces
 
 FAR = 1e150
 """Coordinates [m] from here on are refused: their squares overflow."""

@@ -29,12 +29,12 @@ from typing import NamedTuple
 import numpy as np
 
 from fivebar_sim.arrays import Array, Bools
-from fivebar_sim.coupler import spans
 from fivebar_sim.errors import GeometryError
 from fivebar_sim.geometry import FiveBar
 from fivebar_sim.kinematics.closure import ROUNDING, bases
 from fivebar_sim.kinematics.planar import dot, perp, unit
 from fivebar_sim.kinematics.reach import reaches
+from fivebar_sim.workspace.coupler import spans
 
 
 class Ring(NamedTuple):
