@@ -12,10 +12,10 @@ from typing import NamedTuple
 import numpy as np
 
 from fivebar_sim import kinematics, servo_table
+from fivebar_sim.analysis.singularity import points_at
 from fivebar_sim.arrays import Array, Bools
 from fivebar_sim.geometry import MODES, FiveBar
 from fivebar_sim.kinematics.planar import angle_between, wrap
-from fivebar_sim.singularity import points_at
 
 OUT = Path(__file__).resolve().parent.parent / "docs" / "servo-rounding.svg"
 GRID = 0.25e-3  # [m] between the foot positions that are measured

@@ -9,14 +9,15 @@ import pytest
 from poses import BATCHES, RIGHT, RIGID, sample
 from scipy import ndimage
 
-from fivebar_sim import aspects, kinematics
+from fivebar_sim import kinematics
+from fivebar_sim.analysis import aspects
+from fivebar_sim.analysis.aspects import Aspect, all_aspects, aspect, aspect_at, same_aspect
+from fivebar_sim.analysis.singularity import distances_at, distances_of, signs
 from fivebar_sim.arrays import Array
-from fivebar_sim.aspects import Aspect, all_aspects, aspect, aspect_at, same_aspect
 from fivebar_sim.errors import ArgumentError, LoopOpenError, SingularError, UnreachableError
 from fivebar_sim.geometry import MODES, FiveBar, Mode
 from fivebar_sim.kinematics.planar import unit
 from fivebar_sim.kinematics.reach import points_at
-from fivebar_sim.singularity import distances_at, distances_of, signs
 
 CLASSIC = FiveBar()
 COAXIAL = FiveBar(0.112, 0.199, 0.199, 0.112, 0.0, 0.0325)

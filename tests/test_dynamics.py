@@ -12,7 +12,8 @@ import oracle
 import pytest
 from poses import BATCHES, LINE, RIGHT, RIGID, sample
 
-from fivebar_sim import dynamics, kinematics, model, singularity
+from fivebar_sim import dynamics, kinematics, model
+from fivebar_sim.analysis import singularity
 from fivebar_sim.arrays import Array
 from fivebar_sim.errors import ArgumentError, LoopOpenError, SingularError
 from fivebar_sim.files import resources

@@ -10,12 +10,12 @@ import pytest
 from poses import RIGID
 
 from fivebar_sim import kinematics
+from fivebar_sim.analysis.following import follow, path_report
+from fivebar_sim.analysis.singularity import distances_at
 from fivebar_sim.arrays import Array
 from fivebar_sim.errors import ArgumentError, UnreachableError
-from fivebar_sim.following import follow, path_report
 from fivebar_sim.geometry import MODES, FiveBar, Mode
 from fivebar_sim.kinematics.planar import unit
-from fivebar_sim.singularity import distances_at
 
 CLASSIC = FiveBar()
 COAXIAL = FiveBar(0.112, 0.199, 0.199, 0.112, 0.0, 0.0325)

@@ -8,12 +8,13 @@ import numpy as np
 import pytest
 from poses import BATCHES, RIGHT, RIGID, random_leg, sample
 
-from fivebar_sim import kinematics, quality
+from fivebar_sim import kinematics
+from fivebar_sim.analysis import quality
+from fivebar_sim.analysis.singularity import distances
 from fivebar_sim.arrays import Array
 from fivebar_sim.errors import ArgumentError, LoopOpenError, SingularError
 from fivebar_sim.geometry import MODES, FiveBar, Mode
 from fivebar_sim.kinematics.planar import cross, unit
-from fivebar_sim.singularity import distances
 
 LINE = FiveBar(0.25, 0.5, 0.5, 0.25, 0.5)
 """At IN_LINE its B, C and D are in line."""

@@ -9,13 +9,7 @@ import pytest
 from poses import BATCHES, RIGHT, RIGID, random_leg, sample
 
 from fivebar_sim import kinematics
-from fivebar_sim.arrays import Array
-from fivebar_sim.errors import ArgumentError, LoopOpenError, UnreachableError
-from fivebar_sim.geometry import MODES, FiveBar, Mode
-from fivebar_sim.kinematics import Points
-from fivebar_sim.kinematics.planar import cross, unit
-from fivebar_sim.kinematics.reach import points_at
-from fivebar_sim.singularity import (
+from fivebar_sim.analysis.singularity import (
     EDGE,
     Distances,
     distances,
@@ -24,6 +18,12 @@ from fivebar_sim.singularity import (
     shorter_links,
     signs,
 )
+from fivebar_sim.arrays import Array
+from fivebar_sim.errors import ArgumentError, LoopOpenError, UnreachableError
+from fivebar_sim.geometry import MODES, FiveBar, Mode
+from fivebar_sim.kinematics import Points
+from fivebar_sim.kinematics.planar import cross, unit
+from fivebar_sim.kinematics.reach import points_at
 
 DYADIC = FiveBar(0.25, 0.5, 0.75, 0.375, 0.5)  # sums and differences of the links are exact
 EQUAL = FiveBar(0.25, 0.25, 0.25, 0.25, 0.125)

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from extended_legs import any_leg, around, length, narrow
 
-from fivebar_sim import singularity, workspace
+from fivebar_sim import workspace
+from fivebar_sim.analysis import singularity
 from fivebar_sim.geometry import MODES, FiveBar, Mode
 from fivebar_sim.kinematics.planar import unit
 from fivebar_sim.workspace.coupler import FourBar, cut, trace

@@ -32,13 +32,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from fivebar_sim.analysis.singularity import distances_of, signs
 from fivebar_sim.arrays import Array, Bools, as_pairs, at, first_index
 from fivebar_sim.errors import ArgumentError, SingularError
 from fivebar_sim.geometry import FiveBar, Mode
 from fivebar_sim.kinematics.closure import Points, bases, chain_points, closed_points
 from fivebar_sim.kinematics.planar import cross, unit, wrap
 from fivebar_sim.kinematics.reach import inverse, points_at, side_angle
-from fivebar_sim.singularity import distances_of, signs
 
 Ints = NDArray[np.int_]
 

@@ -12,13 +12,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from fivebar_sim.analysis.singularity import EDGE, Distances, distances_of, shorter_links
 from fivebar_sim.arrays import Array, Bools, as_pairs, at
 from fivebar_sim.checks import check_number
 from fivebar_sim.errors import ArgumentError, UnreachableError
 from fivebar_sim.geometry import MODES, FiveBar, Mode
 from fivebar_sim.kinematics.planar import wrap
 from fivebar_sim.kinematics.reach import inverse, inverse_all, inverse_nearest, points_at
-from fivebar_sim.singularity import EDGE, Distances, distances_of, shorter_links
 
 TIE = 1e-9
 """Squares of angles [rad^2] closer than this are equal: far above rounding, (30 urad)^2."""

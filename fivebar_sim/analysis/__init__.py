@@ -1,0 +1,1 @@
+"""What a leg is like: singularities, quality, aspects, what a path comes close to."""
