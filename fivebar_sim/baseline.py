@@ -28,11 +28,11 @@ from typing import Any
 
 import msgspec
 
-from fivebar_sim.catalogue import ABSOLUTE
 from fivebar_sim.checks import check_number
 from fivebar_sim.errors import ConfigError
 from fivebar_sim.files import input_file, resources, tables, whole_file
-from fivebar_sim.limits import look_up
+from fivebar_sim.metrics.catalogue import ABSOLUTE
+from fivebar_sim.metrics.limits import look_up
 
 RELATIVE = 0.005
 """By what part of its recorded value a metric may move."""

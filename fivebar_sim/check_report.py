@@ -7,8 +7,8 @@ import re
 from collections.abc import Iterator, Sequence
 from xml.etree import ElementTree
 
-from fivebar_sim.catalogue import SHOWN, shown
-from fivebar_sim.limits import bounds
+from fivebar_sim.metrics.catalogue import SHOWN, shown
+from fivebar_sim.metrics.limits import bounds
 from fivebar_sim.regression import BETTER, FAIL, Checked, Row
 
 NO_XML = re.compile("[^\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")

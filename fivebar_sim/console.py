@@ -11,9 +11,9 @@ from rich.markup import escape
 from rich.measure import Measurement
 from rich.table import Table
 
-from fivebar_sim import guards
-from fivebar_sim.catalogue import DETAILS, SHOWN, shown
-from fivebar_sim.limits import bounds, look_up
+from fivebar_sim.metrics import guards
+from fivebar_sim.metrics.catalogue import DETAILS, SHOWN, shown
+from fivebar_sim.metrics.limits import bounds, look_up
 
 if TYPE_CHECKING:
     from fivebar_sim.regression import Checked, Row

@@ -11,14 +11,15 @@ from typing import Any
 import msgspec
 import tomli_w
 
-from fivebar_sim import control, guards, regression, rollout
-from fivebar_sim.catalogue import LIMIT_KEYS, SHOWN, shown
+from fivebar_sim import control, regression, rollout
 from fivebar_sim.checks import check_number
-from fivebar_sim.columns import Record
 from fivebar_sim.control import Feedback, Setpoints
 from fivebar_sim.errors import ArgumentError, ConfigError, FiveBarError, unknown
 from fivebar_sim.files import tables
-from fivebar_sim.limits import Limit, bounds, judge
+from fivebar_sim.metrics import guards
+from fivebar_sim.metrics.catalogue import LIMIT_KEYS, SHOWN, shown
+from fivebar_sim.metrics.columns import Record
+from fivebar_sim.metrics.limits import Limit, bounds, judge
 from fivebar_sim.rollout import Result
 from fivebar_sim.scenario import Scenario
 

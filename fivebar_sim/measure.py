@@ -7,12 +7,13 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from fivebar_sim import energy, ground, guards, kinematics, load
+from fivebar_sim import kinematics
 from fivebar_sim.arrays import Array, Bools
-from fivebar_sim.columns import JOINT_COLUMNS
 from fivebar_sim.geometry import FiveBar
+from fivebar_sim.metrics import energy, ground, guards, load
+from fivebar_sim.metrics.columns import JOINT_COLUMNS
+from fivebar_sim.metrics.tracking import tracking_error
 from fivebar_sim.paths import Gait
-from fivebar_sim.tracking import tracking_error
 
 if TYPE_CHECKING:
     from fivebar_sim.scenario import Scenario

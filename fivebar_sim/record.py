@@ -4,17 +4,18 @@ from __future__ import annotations
 
 import numpy as np
 
-from fivebar_sim import energy, kinematics
+from fivebar_sim import kinematics
 from fivebar_sim.arrays import Array, Bools
-from fivebar_sim.columns import JOINT_COLUMNS, Record
 from fivebar_sim.errors import DivergedError
 from fivebar_sim.measure import Unrecorded
+from fivebar_sim.metrics import energy
+from fivebar_sim.metrics.columns import JOINT_COLUMNS, Record
+from fivebar_sim.metrics.tracking import left_path
 from fivebar_sim.plan import Plan
 from fivebar_sim.scenes import Ground, Treadmill
 from fivebar_sim.servo import Drive, applied_torque
 from fivebar_sim.servo import saturated as clipped
 from fivebar_sim.simulate import States
-from fivebar_sim.tracking import left_path
 
 MOTORS = [0, 2]
 """Where the four joints have A and E."""

@@ -21,8 +21,8 @@ from fivebar_sim import recording_ground as ground
 from fivebar_sim import recording_layout as layout
 from fivebar_sim import recording_scene as scene
 from fivebar_sim.arrays import Array
-from fivebar_sim.columns import Record
 from fivebar_sim.errors import FiveBarError
+from fivebar_sim.metrics.columns import Record
 from fivebar_sim.recording_look import Look, looks
 from fivebar_sim.recording_motion import Motion, Rows, Stage, drawn_rows, motion, points, stage
 from fivebar_sim.recording_series import Series, series

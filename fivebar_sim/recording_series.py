@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from fivebar_sim import ground
 from fivebar_sim.arrays import Array, Bools
-from fivebar_sim.columns import Record
+from fivebar_sim.metrics import ground
+from fivebar_sim.metrics.columns import Record
+from fivebar_sim.metrics.tracking import tracking_error
 from fivebar_sim.recording_look import (
     BLUE,
     GREEN,
@@ -21,7 +22,6 @@ from fivebar_sim.recording_look import (
     Colour,
 )
 from fivebar_sim.recording_motion import points, timestep
-from fivebar_sim.tracking import tracking_error
 
 if TYPE_CHECKING:
     from fivebar_sim.scenario import Scenario

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from fivebar_sim import guards
-from fivebar_sim.catalogue import SHOWN, shown
-from fivebar_sim.limits import Limit, bounds, judge, look_up
+from fivebar_sim.metrics import guards
+from fivebar_sim.metrics.catalogue import SHOWN, shown
+from fivebar_sim.metrics.limits import Limit, bounds, judge, look_up
 
 
 def summary(

@@ -9,8 +9,8 @@ import numpy as np
 
 from fivebar_sim import kinematics, model
 from fivebar_sim.arrays import Array
-from fivebar_sim.columns import JOINT_COLUMNS, Record
 from fivebar_sim.errors import RunDirectoryError
+from fivebar_sim.metrics.columns import JOINT_COLUMNS, Record
 from fivebar_sim.scenario import Scenario
 from fivebar_sim.scenes import Ground, Treadmill
 

@@ -12,15 +12,15 @@ import numpy as np
 
 from fivebar_sim import forces, paths, scenario_table
 from fivebar_sim.arrays import Array
-from fivebar_sim.catalogue import GROUND_KEYS, LIMIT_KEYS
 from fivebar_sim.control import Feedback, Setpoints
 from fivebar_sim.errors import ArgumentError, ConfigError, unknown
 from fivebar_sim.files import resources, tables
 from fivebar_sim.files.tables import Table
 from fivebar_sim.forces import FootForce
 from fivebar_sim.geometry import FiveBar
-from fivebar_sim.guards import Guards
 from fivebar_sim.integrator import Sim
+from fivebar_sim.metrics.catalogue import GROUND_KEYS, LIMIT_KEYS
+from fivebar_sim.metrics.guards import Guards
 from fivebar_sim.paths import FootPath, Gait
 from fivebar_sim.scenes import Air, Ground, Payload, Scene, Treadmill
 from fivebar_sim.sensors import Sensors

@@ -9,10 +9,10 @@ from typing import Annotated, Any, Literal
 
 import msgspec
 
-from fivebar_sim import guards
-from fivebar_sim.catalogue import LIMIT_KEYS
 from fivebar_sim.errors import RunDirectoryError, unknown
 from fivebar_sim.files import input_file, tables
+from fivebar_sim.metrics import guards
+from fivebar_sim.metrics.catalogue import LIMIT_KEYS
 
 LARGEST = 1e100
 """No metric is larger: what is done with one cannot overflow."""

@@ -7,9 +7,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from fivebar_sim import load, run_directory, stored_metrics
-from fivebar_sim.columns import JOINT_COLUMNS, Record
+from fivebar_sim import run_directory, stored_metrics
 from fivebar_sim.errors import FiveBarError, RunDirectoryError
+from fivebar_sim.metrics import load
+from fivebar_sim.metrics.columns import JOINT_COLUMNS, Record
 from fivebar_sim.scenario import Scenario
 from fivebar_sim.scenes import Ground, Treadmill
 from fivebar_sim.simulate import SPEED_LIMIT

@@ -14,10 +14,11 @@ import msgspec
 import numpy as np
 from matplotlib.axes import Axes
 
-from fivebar_sim import dynamics, kinematics, load
+from fivebar_sim import dynamics, kinematics
 from fivebar_sim.arrays import Array, Bools
 from fivebar_sim.geometry import FiveBar
 from fivebar_sim.kinematics.two_link import SerialLeg
+from fivebar_sim.metrics import load
 from fivebar_sim.paths import Gait
 
 OUT = Path(__file__).resolve().parent.parent / "docs" / "load-sharing.svg"

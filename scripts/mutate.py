@@ -69,9 +69,9 @@ ROOMS = {
     "metrics": Room(
         (
             "fivebar_sim/measure.py",
-            "fivebar_sim/tracking.py",
-            "fivebar_sim/load.py",
-            "fivebar_sim/ground.py",
+            "fivebar_sim/metrics/tracking.py",
+            "fivebar_sim/metrics/load.py",
+            "fivebar_sim/metrics/ground.py",
         ),
         ("load", "ground", "metrics_laws"),
     ),

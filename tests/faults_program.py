@@ -15,9 +15,10 @@ from controllers.computed_torque import ComputedTorque
 from controllers.impedance import Impedance
 from controllers.pd import Pd
 from controllers.servo import Servo as Planned
-from fivebar_sim import dynamics, feedback, ground, kinematics, measure, motion, record, rollout
+from fivebar_sim import dynamics, feedback, kinematics, measure, motion, record, rollout
 from fivebar_sim import plan as planning
 from fivebar_sim.control_step import ControlStep
+from fivebar_sim.metrics import ground
 from fivebar_sim.paths import Ellipse, Gait, base, csv, shapes
 from fivebar_sim.scenario import Scenario
 from fivebar_sim.servo import Servo

@@ -8,10 +8,11 @@ import mujoco
 import numpy as np
 import pytest
 
-from fivebar_sim import energy, kinematics, model, rollout
-from fivebar_sim.energy import Body, Steps
+from fivebar_sim import kinematics, model, rollout
 from fivebar_sim.files import resources
 from fivebar_sim.geometry import FiveBar
+from fivebar_sim.metrics import energy
+from fivebar_sim.metrics.energy import Body, Steps
 from fivebar_sim.record import unrecorded
 from fivebar_sim.rollout import Plan, Result
 from fivebar_sim.scenario import Scenario

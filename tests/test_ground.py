@@ -8,9 +8,10 @@ import mujoco
 import numpy as np
 import pytest
 
-from fivebar_sim import ground, kinematics, rollout
+from fivebar_sim import kinematics, rollout
 from fivebar_sim.arrays import Array
 from fivebar_sim.geometry import FiveBar
+from fivebar_sim.metrics import ground
 from fivebar_sim.rollout import Plan, Result
 from fivebar_sim.scenario import Scenario
 

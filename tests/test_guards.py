@@ -9,11 +9,12 @@ import numpy as np
 import pytest
 from shell import Shell
 
-from fivebar_sim import guards, rollout
+from fivebar_sim import rollout
 from fivebar_sim.arrays import Array
 from fivebar_sim.errors import ArgumentError, ConfigError
 from fivebar_sim.geometry import FiveBar
-from fivebar_sim.guards import Guard, Guards
+from fivebar_sim.metrics import guards
+from fivebar_sim.metrics.guards import Guard, Guards
 from fivebar_sim.rollout import Plan, Result
 from fivebar_sim.scenario import Scenario
 

@@ -12,10 +12,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import ArrayLike
 
-from fivebar_sim import dynamics, kinematics, load
+from fivebar_sim import dynamics, kinematics
 from fivebar_sim.arrays import Array
 from fivebar_sim.errors import ArgumentError
 from fivebar_sim.geometry import FiveBar
+from fivebar_sim.metrics import load
 
 H = 0.5
 """Timestep [s] of what is not simulated; its multiples are exact."""

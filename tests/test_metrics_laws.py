@@ -8,10 +8,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from fivebar_sim import energy, ground, guards, kinematics, load, measure, metrics
+from fivebar_sim import kinematics, measure, metrics
 from fivebar_sim.arrays import Array, Bools
 from fivebar_sim.errors import ArgumentError
 from fivebar_sim.geometry import FiveBar
+from fivebar_sim.metrics import energy, ground, guards, load
 from fivebar_sim.paths import Gait
 from fivebar_sim.scenario import Scenario
 

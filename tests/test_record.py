@@ -12,10 +12,11 @@ import pyarrow.parquet
 import pytest
 from shell import Shell
 
-from fivebar_sim import kinematics, load, metrics, record, rollout
+from fivebar_sim import kinematics, metrics, record, rollout
 from fivebar_sim.arrays import Array
-from fivebar_sim.catalogue import SHOWN, shown
 from fivebar_sim.errors import ConfigError
+from fivebar_sim.metrics import load
+from fivebar_sim.metrics.catalogue import SHOWN, shown
 from fivebar_sim.rollout import Plan, Result
 from fivebar_sim.scenario import Scenario
 from fivebar_sim.simulate import simulate

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from recorded import LEG, Record, drawn, ellipse, read, standing, written
 
-from fivebar_sim import ground, recording
+from fivebar_sim import recording
+from fivebar_sim.metrics import ground
 from fivebar_sim.recording_series import SHARE_FLOOR, load_share
 from fivebar_sim.servo import Servo
 

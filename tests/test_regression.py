@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from fivebar_sim import baseline, metrics, regression
 from fivebar_sim.baseline import RELATIVE, Baseline, Recorded
-from fivebar_sim.catalogue import ABSOLUTE, LESS_IS_BETTER, SHOWN
+from fivebar_sim.metrics.catalogue import ABSOLUTE, LESS_IS_BETTER, SHOWN
 from fivebar_sim.rollout import Result
 from fivebar_sim.scenario import Scenario
 

@@ -14,11 +14,11 @@ from reports import Page
 from shell import Shell
 
 from fivebar_sim import report, rollout, run_directory, stored_run
-from fivebar_sim.catalogue import SHOWN, shown
 from fivebar_sim.errors import ArgumentError, RunDirectoryError
 from fivebar_sim.files import tables
-from fivebar_sim.limits import bounds
 from fivebar_sim.metrics import judge, look_up
+from fivebar_sim.metrics.catalogue import SHOWN, shown
+from fivebar_sim.metrics.limits import bounds
 from fivebar_sim.report import comparison, look, single
 from fivebar_sim.scenario import Scenario
 

@@ -13,8 +13,8 @@ import pytest
 from fivebar_sim import baseline, control, regression, rollout, scenes
 from fivebar_sim.errors import FiveBarError
 from fivebar_sim.files import resources
-from fivebar_sim.guards import Guards
 from fivebar_sim.metrics import Limit
+from fivebar_sim.metrics.guards import Guards
 from fivebar_sim.rollout import Plan, Result
 from fivebar_sim.scenario import Scenario
 from fivebar_sim.servo import Servo

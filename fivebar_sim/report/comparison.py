@@ -7,18 +7,18 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fivebar_sim import ground
 from fivebar_sim.arrays import Array
-from fivebar_sim.catalogue import SHOWN, shown
 from fivebar_sim.files import tables
-from fivebar_sim.limits import bounds, look_up
+from fivebar_sim.metrics import ground
+from fivebar_sim.metrics.catalogue import SHOWN, shown
+from fivebar_sim.metrics.limits import bounds, look_up
+from fivebar_sim.metrics.tracking import tracking_error
 from fivebar_sim.recording_series import points
 from fivebar_sim.report import draw, html, numbers
 from fivebar_sim.report.draw import Drawn
 from fivebar_sim.report.html import Cell, plain, text
 from fivebar_sim.report.look import colour
 from fivebar_sim.stored_run import StoredRun
-from fivebar_sim.tracking import tracking_error
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 
 from fivebar_sim import kinematics, workspace
 from fivebar_sim.arrays import Array
-from fivebar_sim.catalogue import shown
-from fivebar_sim.columns import JOINT_COLUMNS
-from fivebar_sim.limits import look_up
+from fivebar_sim.metrics.catalogue import shown
+from fivebar_sim.metrics.columns import JOINT_COLUMNS
+from fivebar_sim.metrics.limits import look_up
 from fivebar_sim.recording_series import points
 from fivebar_sim.report import draw
 from fivebar_sim.report.draw import Drawn

@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 
 from fivebar_sim.arrays import Array
-from fivebar_sim.catalogue import GROUND_KEYS, SHOWN
 from fivebar_sim.control import Feedback
 from fivebar_sim.files import tables
-from fivebar_sim.limits import Limit, judge
+from fivebar_sim.metrics.catalogue import GROUND_KEYS, SHOWN
+from fivebar_sim.metrics.limits import Limit, judge
+from fivebar_sim.metrics.tracking import tracking_error
 from fivebar_sim.recording_series import SHARE_WINDOW, load_share
 from fivebar_sim.stored_run import StoredRun
-from fivebar_sim.tracking import tracking_error
 
 PERCENTILE = 95.0
 """Of the tracking error, beside its RMS."""

@@ -6,11 +6,11 @@ import shlex
 
 import tomli_w
 
-from fivebar_sim import guards
-from fivebar_sim.catalogue import SHOWN, shown
 from fivebar_sim.checks import is_finite
 from fivebar_sim.files import tables
-from fivebar_sim.limits import bounds, look_up
+from fivebar_sim.metrics import guards
+from fivebar_sim.metrics.catalogue import SHOWN, shown
+from fivebar_sim.metrics.limits import bounds, look_up
 from fivebar_sim.report import html, in_plane, numbers, over_time
 from fivebar_sim.report.draw import Drawn
 from fivebar_sim.report.html import plain, text

@@ -20,10 +20,10 @@ import numpy as np
 
 from fivebar_sim import kinematics
 from fivebar_sim.arrays import Array
-from fivebar_sim.columns import JOINTS
 from fivebar_sim.dynamics.chain import Chain, Pose, Vector, placed
 from fivebar_sim.geometry import FiveBar
-from fivebar_sim.ground import contact_radius
+from fivebar_sim.metrics.columns import JOINTS
+from fivebar_sim.metrics.ground import contact_radius
 
 """The leg's joints in the order of qpos."""
 

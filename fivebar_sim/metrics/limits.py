@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
-from fivebar_sim.catalogue import shown
+from fivebar_sim.metrics.catalogue import shown
 
 
 class Limit(NamedTuple):

@@ -14,11 +14,11 @@ from typing import Any, NamedTuple
 import msgspec
 import numpy as np
 
-from fivebar_sim import ground
 from fivebar_sim.arrays import Array, Bools
 from fivebar_sim.checks import check_number
-from fivebar_sim.energy import Balance
 from fivebar_sim.geometry import FiveBar
+from fivebar_sim.metrics import ground
+from fivebar_sim.metrics.energy import Balance
 
 WITHIN = 1.0
 """Over this time [s] clipped and chattering steps are added up; of a shorter run, over all."""
