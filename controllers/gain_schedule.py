@@ -10,10 +10,11 @@ import numpy as np
 from fivebar_sim import kinematics
 from fivebar_sim.arrays import Array, together
 from fivebar_sim.checks import check_number
-from fivebar_sim.control import Drive, Observation, Reference
+from fivebar_sim.control import Observation, Reference
+from fivebar_sim.control.interface import Drive
+from fivebar_sim.control.servo import Servo
 from fivebar_sim.errors import LoopOpenError
 from fivebar_sim.geometry import FiveBar
-from fivebar_sim.servo import Servo
 
 
 class GainSchedule(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):

@@ -9,10 +9,10 @@ import numpy as np
 
 from fivebar_sim import dynamics
 from fivebar_sim.arrays import Array
+from fivebar_sim.control.servo import Servo as ServoGains
 from fivebar_sim.geometry import FiveBar
 from fivebar_sim.integrator import Integrator
 from fivebar_sim.motion import Motion
-from fivebar_sim.servo import Servo as ServoGains
 
 MOTORS = [0, 2]
 """A and E among the joints A, B, E, D."""

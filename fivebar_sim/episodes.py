@@ -13,10 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fivebar_sim.arrays import Array, Bools, as_vectors
-from fivebar_sim.control_step import ControlStep
+from fivebar_sim.control.servo import applied_torque
+from fivebar_sim.control.stacked import stacked
+from fivebar_sim.control.step import ControlStep
 from fivebar_sim.errors import ArgumentError
-from fivebar_sim.servo import applied_torque
-from fivebar_sim.stacked import stacked
 from fivebar_sim.tasks.base import Part, Task
 from fivebar_sim.tasks.motion import TIME, motion
 

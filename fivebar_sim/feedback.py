@@ -9,7 +9,7 @@ import numpy as np
 
 from fivebar_sim.arrays import Array
 from fivebar_sim.control import Feedback, Reference
-from fivebar_sim.control_step import ControlStep
+from fivebar_sim.control.step import ControlStep
 from fivebar_sim.errors import ConfigError, DivergedError, FiveBarError, PoseError
 from fivebar_sim.motion import Motion
 from fivebar_sim.plan import Plan, period_steps

@@ -16,13 +16,13 @@ import numpy as np
 
 from fivebar_sim import kinematics
 from fivebar_sim.arrays import Array
+from fivebar_sim.control.servo import Drive, Servo
 from fivebar_sim.errors import ArgumentError, GeometryError, unknown
 from fivebar_sim.files import resources
 from fivebar_sim.geometry import LONGEST, FiveBar, Link, combined
 from fivebar_sim.integrator import CONNECT, Integrator, solref
 from fivebar_sim.kinematics.stops import stops_at_C
 from fivebar_sim.scenes import Ground, Payload, Scene, Treadmill, named
-from fivebar_sim.servo import Drive, Servo
 
 JOINTS = ("A", "B", "E", "D")
 """The joints in the order of qpos, and of every (..., 4) array of joint angles.

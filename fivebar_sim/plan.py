@@ -10,7 +10,7 @@ import numpy as np
 from fivebar_sim import holding, model, motion
 from fivebar_sim.arrays import Array
 from fivebar_sim.control import Feedback, Setpoints
-from fivebar_sim.control_step import whole_steps
+from fivebar_sim.control.step import whole_steps
 from fivebar_sim.errors import ConfigError, FiveBarError
 from fivebar_sim.motion import Motion
 from fivebar_sim.scenario import Scenario

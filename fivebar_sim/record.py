@@ -6,6 +6,8 @@ import numpy as np
 
 from fivebar_sim import kinematics
 from fivebar_sim.arrays import Array, Bools
+from fivebar_sim.control.servo import Drive, applied_torque
+from fivebar_sim.control.servo import saturated as clipped
 from fivebar_sim.errors import DivergedError
 from fivebar_sim.measure import Unrecorded
 from fivebar_sim.metrics import energy
@@ -13,8 +15,6 @@ from fivebar_sim.metrics.columns import JOINT_COLUMNS, Record
 from fivebar_sim.metrics.tracking import left_path
 from fivebar_sim.plan import Plan
 from fivebar_sim.scenes import Ground, Treadmill
-from fivebar_sim.servo import Drive, applied_torque
-from fivebar_sim.servo import saturated as clipped
 from fivebar_sim.simulate import States
 
 MOTORS = [0, 2]

@@ -13,6 +13,8 @@ import numpy as np
 from fivebar_sim import forces, paths, scenario_table
 from fivebar_sim.arrays import Array
 from fivebar_sim.control import Feedback, Setpoints
+from fivebar_sim.control.sensors import Sensors
+from fivebar_sim.control.servo import Servo
 from fivebar_sim.errors import ArgumentError, ConfigError, unknown
 from fivebar_sim.files import resources, tables
 from fivebar_sim.files.tables import Table
@@ -23,8 +25,6 @@ from fivebar_sim.metrics.catalogue import GROUND_KEYS, LIMIT_KEYS
 from fivebar_sim.metrics.guards import Guards
 from fivebar_sim.paths import FootPath, Gait
 from fivebar_sim.scenes import Air, Ground, Payload, Scene, Treadmill
-from fivebar_sim.sensors import Sensors
-from fivebar_sim.servo import Servo
 
 MOST_STEPS = 5_000_000
 """Physics steps of one run: what its arrays need, about 600 bytes a step, must fit in memory."""

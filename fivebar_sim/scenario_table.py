@@ -10,6 +10,8 @@ from typing import Any
 from fivebar_sim import control, forces, geometry, paths, scenes
 from fivebar_sim.checks import check_number
 from fivebar_sim.control import Feedback, Setpoints
+from fivebar_sim.control.servo import Servo
+from fivebar_sim.control.servo import read_table as read_servo
 from fivebar_sim.errors import ArgumentError, ConfigError, unknown
 from fivebar_sim.files import tables
 from fivebar_sim.files.tables import Table
@@ -17,8 +19,6 @@ from fivebar_sim.forces import FootForce
 from fivebar_sim.geometry import FiveBar
 from fivebar_sim.paths import FootPath
 from fivebar_sim.scenes import Scene
-from fivebar_sim.servo import Servo
-from fivebar_sim.servo import read_table as read_servo
 
 NAME = re.compile(r"""(?![. ])[^/\\:*?"<>|]+(?<! )""")
 LONGEST_NAME = 200

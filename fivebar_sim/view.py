@@ -15,12 +15,12 @@ import mujoco
 import numpy as np
 
 from fivebar_sim import model, render_scene, screen
+from fivebar_sim.control.servo import Servo
 from fivebar_sim.errors import ConfigError, unknown
 from fivebar_sim.files import resources, tables
 from fivebar_sim.geometry import FiveBar
 from fivebar_sim.render_replay import Replay
 from fivebar_sim.scenario import Scenario
-from fivebar_sim.servo import Servo
 
 INSTEAD = "`fivebar render` draws a run without one"
 """What works where no window can open."""

@@ -11,9 +11,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fivebar_sim import kinematics, servo_table
+from fivebar_sim import kinematics
 from fivebar_sim.analysis.singularity import points_at
 from fivebar_sim.arrays import Array, Bools
+from fivebar_sim.control import hobby
 from fivebar_sim.geometry import MODES, FiveBar
 from fivebar_sim.kinematics.planar import angle_between, wrap
 
@@ -34,7 +35,7 @@ class Rounding(NamedTuple):
     margin_deg: Array
 
 
-def in_range(leg: FiveBar, theta: Array, table: servo_table.ServoTable) -> Bools:
+def in_range(leg: FiveBar, theta: Array, table: hobby.ServoTable) -> Bools:
     """Return which poses both servos can be sent."""
     inside = np.ones(theta.shape[:-1], dtype=bool)
     for side, servo in enumerate((table.A, table.E)):
@@ -57,13 +58,13 @@ def measure(leg: FiveBar, step: float) -> Rounding:
     foot, theta = foot[found], theta[found]
     points = points_at(leg, foot, theta)
     good = kinematics.branch(leg, points).assembly == leg.assembly
-    good &= in_range(leg, theta, servo_table.HANGING)
+    good &= in_range(leg, theta, hobby.HANGING)
     foot, theta = foot[good], theta[good]
 
-    bound = servo_table.rounding_bound(leg, theta)
+    bound = hobby.rounding_bound(leg, theta)
     finite = np.isfinite(bound.remainder)
     foot, theta = foot[finite], theta[finite]
-    error = servo_table.rounding_error(leg, theta)
+    error = hobby.rounding_error(leg, theta)
     p = points_at(leg, foot, theta)
     gamma = np.abs(angle_between(p.C_left - p.B, p.C_left - p.D))
     margin_deg = np.degrees(np.minimum(gamma, np.pi - gamma))

@@ -19,8 +19,8 @@ import numpy as np
 from controllers.servo import Servo as PathServo
 from fivebar_sim import motion
 from fivebar_sim.arrays import Array
+from fivebar_sim.control.servo import Servo
 from fivebar_sim.scenario import Scenario
-from fivebar_sim.servo import Servo
 from fivebar_sim.tasks import Hop
 from fivebar_sim.tasks.base import turning
 from fivebar_sim.vector import LegVectorEnv

@@ -24,8 +24,8 @@ import validation_flip as flip
 import validation_stance as stance
 from validation_air import Key
 
+from fivebar_sim.control.servo import Servo
 from fivebar_sim.integrator import Integrator
-from fivebar_sim.servo import Servo
 
 ROOT = Path(__file__).resolve().parent.parent
 OUT = ROOT / "docs" / "validation.svg"

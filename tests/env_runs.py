@@ -10,9 +10,9 @@ import numpy as np
 from fivebar_sim import Scenario, rollout, tasks
 from fivebar_sim.arrays import Array
 from fivebar_sim.control import Observation, Reference
+from fivebar_sim.control.servo import Drive, Servo
 from fivebar_sim.geometry import FiveBar
 from fivebar_sim.scenes import Ground
-from fivebar_sim.servo import Drive, Servo
 
 PERIOD = 0.005
 SCENES = {

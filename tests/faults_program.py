@@ -17,11 +17,11 @@ from controllers.pd import Pd
 from controllers.servo import Servo as Planned
 from fivebar_sim import dynamics, feedback, kinematics, measure, motion, record, rollout
 from fivebar_sim import plan as planning
-from fivebar_sim.control_step import ControlStep
+from fivebar_sim.control.servo import Servo
+from fivebar_sim.control.step import ControlStep
 from fivebar_sim.metrics import ground
 from fivebar_sim.paths import Ellipse, Gait, base, csv, shapes
 from fivebar_sim.scenario import Scenario
-from fivebar_sim.servo import Servo
 
 Right = Callable[..., Any]
 

@@ -8,10 +8,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from fivebar_sim.arrays import Array
-from fivebar_sim.control_step import ControlStep, whole_steps
+from fivebar_sim.control.sensors import Sensors
+from fivebar_sim.control.servo import Drive, Servo
+from fivebar_sim.control.step import ControlStep, whole_steps
 from fivebar_sim.errors import ArgumentError
-from fivebar_sim.sensors import Sensors
-from fivebar_sim.servo import Drive, Servo
 
 H = 1e-3
 SMALL = st.integers(0, 12)

@@ -21,10 +21,10 @@ from controllers.pd import Pd
 from fivebar_sim import control, dynamics, kinematics
 from fivebar_sim.arrays import Array
 from fivebar_sim.control import Observation, Reference
+from fivebar_sim.control.servo import Servo
 from fivebar_sim.errors import ArgumentError, ConfigError, LoopOpenError, SingularError
 from fivebar_sim.files.tables import convert
 from fivebar_sim.geometry import FiveBar
-from fivebar_sim.servo import Servo
 
 NAMES = {
     "pd": Pd,

@@ -18,10 +18,10 @@ from controllers.pd import Pd
 from fivebar_sim import dynamics, kinematics
 from fivebar_sim.arrays import Array
 from fivebar_sim.control import Observation, Reference
+from fivebar_sim.control.servo import Servo
 from fivebar_sim.errors import DivergedError
 from fivebar_sim.geometry import FiveBar
 from fivebar_sim.paths import Circle
-from fivebar_sim.servo import Servo
 
 AIRHOCKEY, EXTENDED = FiveBar.load("airhockey"), FiveBar.load("extended")
 CLASSIC, HOME = FiveBar.load("classic"), kinematics.home(AIRHOCKEY)[::2]

@@ -15,13 +15,13 @@ from poses import BATCHES, RIGID
 
 from fivebar_sim import dynamics, kinematics, model, motion
 from fivebar_sim.arrays import Array
+from fivebar_sim.control.servo import Servo
 from fivebar_sim.errors import ArgumentError, DivergedError, SingularError
 from fivebar_sim.files import resources
 from fivebar_sim.geometry import FiveBar
 from fivebar_sim.integrator import pull
 from fivebar_sim.motion import Motion
 from fivebar_sim.paths import Ellipse
-from fivebar_sim.servo import Servo
 
 LEG = FiveBar.load("classic")
 LEGS = {name: FiveBar.load(name) for name in resources.shipped("models/legs")} | {"rigid": RIGID}

@@ -22,9 +22,9 @@ from fivebar_sim import (
     gl,
     kinematics,
 )
+from fivebar_sim.control.servo import Servo
 from fivebar_sim.errors import ArgumentError, ConfigError, UnreachableError
 from fivebar_sim.gym import LegEnv
-from fivebar_sim.servo import Servo
 from fivebar_sim.tasks import KINDS, Randomise
 
 # isort: split

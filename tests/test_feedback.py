@@ -12,12 +12,13 @@ import pytest
 from controllers.pd import Pd
 from fivebar_sim import rollout
 from fivebar_sim.arrays import Array
-from fivebar_sim.control import Drive, Observation, Reference
+from fivebar_sim.control import Observation, Reference
+from fivebar_sim.control.interface import Drive
+from fivebar_sim.control.servo import Servo
 from fivebar_sim.errors import ArgumentError, ConfigError, DivergedError, LoopOpenError
 from fivebar_sim.geometry import FiveBar
 from fivebar_sim.rollout import Plan
 from fivebar_sim.scenario import Scenario
-from fivebar_sim.servo import Servo
 
 H = 1e-3
 ASIDE = ["duration=0.4", "path.frequency=4", "path.ramp=0.1", "limits={}"]

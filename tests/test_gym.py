@@ -16,12 +16,12 @@ from gymnasium.utils.env_checker import check_env
 import fivebar_sim.gym
 from controllers.servo import Servo as Feedforward
 from fivebar_sim import Scenario, kinematics, motion, run
+from fivebar_sim.control.sensors import Sensors
+from fivebar_sim.control.servo import Servo
 from fivebar_sim.errors import ArgumentError, ConfigError
 from fivebar_sim.gym import LegEnv
 from fivebar_sim.metrics import ground
 from fivebar_sim.scenes import Treadmill
-from fivebar_sim.sensors import Sensors
-from fivebar_sim.servo import Servo
 from fivebar_sim.tasks import KINDS
 
 ROOT = Path(__file__).resolve().parents[1]

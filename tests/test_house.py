@@ -34,7 +34,7 @@ PURE = (
     "analysis.quality",
     "analysis.aspects",
     "analysis.following",
-    "servo_table",
+    "control.hobby",
     "paths",
     "forces",
     "metrics.load",
@@ -43,12 +43,12 @@ PURE = (
     "metrics.guards",
     "integrator",
     "scenes",
-    "sensors",
-    "servo",
-    "control_step",
+    "control.sensors",
+    "control.servo",
+    "control.step",
     "tasks",
     "episodes",
-    "stacked",
+    "control.stacked",
 )
 HEAVY = {"mujoco", "rerun", "matplotlib", "scipy"}
 

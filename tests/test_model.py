@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from fivebar_sim import kinematics, model
+from fivebar_sim.control.servo import Servo
 from fivebar_sim.errors import ArgumentError
 from fivebar_sim.files import resources
 from fivebar_sim.geometry import FiveBar
-from fivebar_sim.servo import Servo
 
 LEGS = {name: FiveBar.load(name) for name in resources.shipped("models/legs")}
 ODD = LEGS["extended"]

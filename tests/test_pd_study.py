@@ -13,9 +13,9 @@ from controllers.pd import Pd
 from fivebar_sim import dynamics, kinematics, rollout, workspace
 from fivebar_sim.arrays import Array
 from fivebar_sim.control import Observation, Reference
+from fivebar_sim.control.servo import Servo
 from fivebar_sim.rollout import Result
 from fivebar_sim.scenario import Scenario
-from fivebar_sim.servo import Servo
 
 PAGE = Path(__file__).parents[1] / "docs" / "controllers.md"
 STUDY = "airhockey-pd"

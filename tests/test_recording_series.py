@@ -9,9 +9,9 @@ import pytest
 from recorded import LEG, Record, drawn, ellipse, read, standing, written
 
 from fivebar_sim import recording
+from fivebar_sim.control.servo import Servo
 from fivebar_sim.metrics import ground
 from fivebar_sim.recording_series import SHARE_FLOOR, load_share
-from fivebar_sim.servo import Servo
 
 ANGLES = ["theta_A", "theta_B", "theta_E", "theta_D"]
 

@@ -12,13 +12,13 @@ import pytest
 import tomli_w
 
 from fivebar_sim import rollout
+from fivebar_sim.control.servo import Servo
 from fivebar_sim.errors import ConfigError
 from fivebar_sim.files import resources
 from fivebar_sim.geometry import FiveBar
 from fivebar_sim.paths import Circle, Csv, Ellipse
 from fivebar_sim.scenario import MOST_STEPS, Scenario, Sim, copied_name
 from fivebar_sim.scenes import Air
-from fivebar_sim.servo import Servo
 
 ELLIPSE = """
 duration = 0.6

@@ -14,12 +14,12 @@ from mujoco.batch import Batch
 
 from fivebar_sim import model, motion
 from fivebar_sim.arrays import Array
+from fivebar_sim.control.servo import Drive, Servo, applied_torque, saturated
 from fivebar_sim.errors import ArgumentError, ConfigError
 from fivebar_sim.files import resources
 from fivebar_sim.geometry import FiveBar
 from fivebar_sim.integrator import Integrator
 from fivebar_sim.paths import Ellipse
-from fivebar_sim.servo import Drive, Servo, applied_torque, saturated
 
 H = 1e-3
 LEG = FiveBar()

@@ -13,11 +13,7 @@ from poses import BATCHES, RIGID, length, random_leg, sample
 
 from fivebar_sim import kinematics
 from fivebar_sim.arrays import Array
-from fivebar_sim.errors import ArgumentError, FiveBarError, UnreachableError
-from fivebar_sim.geometry import MODES, FiveBar
-from fivebar_sim.kinematics.planar import wrap
-from fivebar_sim.kinematics.reach import points_at
-from fivebar_sim.servo_table import (
+from fivebar_sim.control.hobby import (
     HANGING,
     PUBLISHED,
     HobbyServo,
@@ -27,6 +23,10 @@ from fivebar_sim.servo_table import (
     rounding_error,
     servo_angles,
 )
+from fivebar_sim.errors import ArgumentError, FiveBarError, UnreachableError
+from fivebar_sim.geometry import MODES, FiveBar
+from fivebar_sim.kinematics.planar import wrap
+from fivebar_sim.kinematics.reach import points_at
 
 SCRIPT = Path(__file__).parents[1] / "scripts" / "servo_rounding.py"
 DEGREE = math.pi / 180.0

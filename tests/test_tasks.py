@@ -11,12 +11,12 @@ from hypothesis import strategies as st
 
 from fivebar_sim import FiveBar, dynamics, kinematics, tasks
 from fivebar_sim.control import Observation
+from fivebar_sim.control.servo import Servo
+from fivebar_sim.control.stacked import stacked
 from fivebar_sim.episodes import Episodes, part_at
 from fivebar_sim.errors import ArgumentError, ConfigError, UnreachableError
 from fivebar_sim.leg_group import LegGroup, starts
 from fivebar_sim.paths import Circle, Line
-from fivebar_sim.servo import Servo
-from fivebar_sim.stacked import stacked
 from fivebar_sim.tasks import KINDS, REASONS, Randomise, Task
 from fivebar_sim.tasks.motion import Motion, motion
 

@@ -12,9 +12,9 @@ from env_runs import actions, played, scenario, task_of
 from gymnasium.vector import AutoresetMode
 
 import fivebar_sim.gym
+from fivebar_sim.control.sensors import Sensors
 from fivebar_sim.errors import ArgumentError
 from fivebar_sim.gym import LegEnv
-from fivebar_sim.sensors import Sensors
 from fivebar_sim.tasks import KINDS, Hop, Randomise
 from fivebar_sim.vector import LegVectorEnv
 

@@ -19,6 +19,7 @@ from mujoco.batch import Batch
 from controllers.servo import Servo as Law
 from fivebar_sim import dynamics, kinematics, rollout
 from fivebar_sim.arrays import Array
+from fivebar_sim.control.servo import Servo
 from fivebar_sim.files import resources
 from fivebar_sim.forces import Constant
 from fivebar_sim.geometry import FiveBar
@@ -27,7 +28,6 @@ from fivebar_sim.paths import Ellipse, Line
 from fivebar_sim.rollout import Plan, Result
 from fivebar_sim.scenario import Scenario, Sim
 from fivebar_sim.scenes import Air, Scene
-from fivebar_sim.servo import Servo
 
 PRESETS = tuple(resources.shipped("models/legs"))
 INTEGRATORS: tuple[Integrator, ...] = ("discrete", "implicitfast")

@@ -12,8 +12,8 @@ import test_dynamics_motion as motion_tests
 
 from fivebar_sim import dynamics, kinematics, model, simulate
 from fivebar_sim.arrays import Array
+from fivebar_sim.control.servo import Servo
 from fivebar_sim.integrator import Integrator
-from fivebar_sim.servo import Servo
 
 LEG, SLACK, START = motion_tests.LEG, motion_tests.SLACK, motion_tests.START
 STIFFNESS = motion_tests.STIFFNESS

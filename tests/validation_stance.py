@@ -18,13 +18,13 @@ from validation_air import Key
 
 from fivebar_sim import dynamics, kinematics, rollout
 from fivebar_sim.arrays import Array
+from fivebar_sim.control.servo import Servo
 from fivebar_sim.geometry import FiveBar
 from fivebar_sim.integrator import Integrator
 from fivebar_sim.metrics import ground as floor
 from fivebar_sim.paths import Ellipse, Line
 from fivebar_sim.rollout import Plan, Result
 from fivebar_sim.scenes import Air, Rail, Scene
-from fivebar_sim.servo import Servo
 
 HANGING = ("classic", "doggo", "extended", "minitaur", "q8bot")
 TRUNK = 0.5  # [kg]

@@ -16,7 +16,7 @@ from stable_baselines3 import PPO
 from stable_baselines3.common.vec_env import VecEnv, VecMonitor, VecNormalize
 
 import fivebar_sim.gym  # noqa: F401 - registers the tasks
-from fivebar_sim.servo import Servo
+from fivebar_sim.control.servo import Servo
 
 LIMIT = 1.0  # [N m]
 THREADS = 2

@@ -9,9 +9,9 @@ from typing import Any
 
 import msgspec
 
+from fivebar_sim.control.servo import Servo
 from fivebar_sim.errors import ArgumentError, unknown
 from fivebar_sim.geometry import FiveBar
-from fivebar_sim.servo import Servo
 from fivebar_sim.tasks.base import ACTIONS, Action, Part, Task
 from fivebar_sim.tasks.gait import Gait
 from fivebar_sim.tasks.hop import Hop

@@ -11,14 +11,14 @@ from fivebar_sim import kinematics
 from fivebar_sim.arrays import Array
 from fivebar_sim.checks import check_number
 from fivebar_sim.control import Observation
-from fivebar_sim.control_step import whole_steps
+from fivebar_sim.control.sensors import Sensors
+from fivebar_sim.control.servo import Drive, Servo
+from fivebar_sim.control.step import whole_steps
 from fivebar_sim.errors import ArgumentError, ConfigError, unknown
 from fivebar_sim.geometry import FiveBar
 from fivebar_sim.integrator import Integrator
 from fivebar_sim.paths import FootPath
 from fivebar_sim.scenes import Ground, Scene
-from fivebar_sim.sensors import Sensors
-from fivebar_sim.servo import Drive, Servo
 from fivebar_sim.tasks.motion import Motion
 
 Action = Literal["position", "motion", "torque"]

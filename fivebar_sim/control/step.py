@@ -13,11 +13,11 @@ from numpy.typing import NDArray
 
 from fivebar_sim.arrays import Array
 from fivebar_sim.checks import LARGEST, check_number
-from fivebar_sim.control import Drive, Observation
+from fivebar_sim.control.interface import Drive, Observation
+from fivebar_sim.control.sensors import Sensors
+from fivebar_sim.control.servo import Servo
+from fivebar_sim.control.stacked import stacked
 from fivebar_sim.errors import ArgumentError
-from fivebar_sim.sensors import Sensors
-from fivebar_sim.servo import Servo
-from fivebar_sim.stacked import stacked
 
 DRAWN = 64
 """Control steps whose noise is drawn in one go; the numbers are those of one by one."""

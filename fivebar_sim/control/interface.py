@@ -8,11 +8,11 @@ from typing import Any, ClassVar, NamedTuple, Protocol, runtime_checkable
 import msgspec
 
 from fivebar_sim.arrays import Array
+from fivebar_sim.control.servo import Drive, Servo
 from fivebar_sim.errors import ConfigError, unknown
 from fivebar_sim.geometry import FiveBar
 from fivebar_sim.integrator import Integrator
 from fivebar_sim.motion import Motion
-from fivebar_sim.servo import Drive, Servo
 
 GROUP = "fivebar_sim.controllers"
 

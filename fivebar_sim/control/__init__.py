@@ -1,0 +1,5 @@
+"""What a controller is, the servo that it drives, and what it sees."""
+
+from fivebar_sim.control.interface import Feedback, Observation, Reference, Setpoints, find, known
+
+__all__ = ["Feedback", "Observation", "Reference", "Setpoints", "find", "known"]
