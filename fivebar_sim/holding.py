@@ -9,7 +9,7 @@ from fivebar_sim.arrays import Array
 from fivebar_sim.errors import ConfigError
 from fivebar_sim.motion import Motion
 from fivebar_sim.scenario import Scenario
-from fivebar_sim.scenes import Ground
+from fivebar_sim.scenario.scenes import Ground
 
 
 def check(scenario: Scenario, wanted: Motion) -> None:

@@ -25,7 +25,7 @@ from fivebar_sim.record import columns
 from fivebar_sim.recording_look import Look
 from fivebar_sim.recording_motion import Motion, Stage, motion, stage
 from fivebar_sim.recording_series import Series, series
-from fivebar_sim.scenes import Ground
+from fivebar_sim.scenario.scenes import Ground
 from fivebar_sim.simulate import States, Watch
 
 if TYPE_CHECKING:

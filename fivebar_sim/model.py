@@ -22,7 +22,7 @@ from fivebar_sim.files import resources
 from fivebar_sim.geometry import LONGEST, FiveBar, Link, combined
 from fivebar_sim.integrator import CONNECT, Integrator, solref
 from fivebar_sim.kinematics.stops import stops_at_C
-from fivebar_sim.scenes import Ground, Payload, Scene, Treadmill, named
+from fivebar_sim.scenario.scenes import Ground, Payload, Scene, Treadmill, named
 
 JOINTS = ("A", "B", "E", "D")
 """The joints in the order of qpos, and of every (..., 4) array of joint angles.

@@ -14,7 +14,7 @@ from fivebar_sim.control.step import whole_steps
 from fivebar_sim.errors import ConfigError, FiveBarError
 from fivebar_sim.motion import Motion
 from fivebar_sim.scenario import Scenario
-from fivebar_sim.scenes import Ground, Payload
+from fivebar_sim.scenario.scenes import Ground, Payload
 
 
 class Plan(NamedTuple):

@@ -14,7 +14,7 @@ from fivebar_sim.metrics import energy
 from fivebar_sim.metrics.columns import JOINT_COLUMNS, Record
 from fivebar_sim.metrics.tracking import left_path
 from fivebar_sim.plan import Plan
-from fivebar_sim.scenes import Ground, Treadmill
+from fivebar_sim.scenario.scenes import Ground, Treadmill
 from fivebar_sim.simulate import States
 
 MOTORS = [0, 2]

@@ -12,7 +12,7 @@ from fivebar_sim.arrays import Array
 from fivebar_sim.errors import RunDirectoryError
 from fivebar_sim.metrics.columns import JOINT_COLUMNS, Record
 from fivebar_sim.scenario import Scenario
-from fivebar_sim.scenes import Ground, Treadmill
+from fivebar_sim.scenario.scenes import Ground, Treadmill
 
 FITTED = 600
 """Poses that the camera is fitted to; of a longer run every so-manieth row."""

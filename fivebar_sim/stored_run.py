@@ -12,7 +12,7 @@ from fivebar_sim.errors import FiveBarError, RunDirectoryError
 from fivebar_sim.metrics import load
 from fivebar_sim.metrics.columns import JOINT_COLUMNS, Record
 from fivebar_sim.scenario import Scenario
-from fivebar_sim.scenes import Ground, Treadmill
+from fivebar_sim.scenario.scenes import Ground, Treadmill
 from fivebar_sim.simulate import SPEED_LIMIT
 
 COLUMNS = (

@@ -12,7 +12,7 @@ from fivebar_sim.arrays import Array
 from fivebar_sim.control import Observation, Reference
 from fivebar_sim.control.servo import Drive, Servo
 from fivebar_sim.geometry import FiveBar
-from fivebar_sim.scenes import Ground
+from fivebar_sim.scenario.scenes import Ground
 
 PERIOD = 0.005
 SCENES = {

@@ -18,7 +18,8 @@ from hypothesis import HealthCheck, example, given, settings
 from hypothesis.strategies import SearchStrategy
 from shell import Said
 
-from fivebar_sim import cli, run_directory, scenario
+from fivebar_sim import cli, run_directory
+from fivebar_sim.scenario import scenario
 
 STEPS = 2000
 """Steps that a run may have here; the program's own bound is tried in test_robust.py."""

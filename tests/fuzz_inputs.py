@@ -9,11 +9,12 @@ from typing import Any
 import tomli_w
 from hypothesis import strategies as st
 
-from fivebar_sim import control, forces, geometry, paths, scenario, scenes
+from fivebar_sim import control, geometry, paths
 from fivebar_sim.control.sensors import Sensors
 from fivebar_sim.control.servo import Servo
 from fivebar_sim.files import resources, tables
 from fivebar_sim.metrics import LIMIT_KEYS
+from fivebar_sim.scenario import forces, scenario, scenes
 
 Strategy = st.SearchStrategy[Any]
 Table = dict[str, Any]

@@ -25,7 +25,7 @@ import pytest
 
 ROOT = Path(__file__).parents[1]
 LINKS = ("canonical", "next", "prev")
-ROOMS = ("kinematics", "dynamics", "paths", "forces", "tasks")
+ROOMS = ("kinematics", "dynamics", "paths", "scenario.forces", "tasks")
 
 
 class Loaded(HTMLParser):

@@ -16,7 +16,7 @@ from fivebar_sim.metrics.energy import Body, Steps
 from fivebar_sim.record import unrecorded
 from fivebar_sim.rollout import Plan, Result
 from fivebar_sim.scenario import Scenario
-from fivebar_sim.scenes import Ground, Payload, Rail
+from fivebar_sim.scenario.scenes import Ground, Payload, Rail
 
 PRESETS = tuple(resources.shipped("models/legs"))
 INTEGRATORS = ("discrete", "implicitfast")

@@ -22,7 +22,7 @@ from fivebar_sim.files import resources
 from fivebar_sim.geometry import FiveBar
 from fivebar_sim.integrator import Integrator
 from fivebar_sim.paths import Csv, Ellipse, PathSpec
-from fivebar_sim.scenes import Payload
+from fivebar_sim.scenario.scenes import Payload
 
 CLASSIC = FiveBar.load("classic")
 PRESETS = {name: FiveBar.load(name) for name in resources.shipped("models/legs")}

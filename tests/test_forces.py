@@ -14,10 +14,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fivebar_sim import forces
 from fivebar_sim.errors import ArgumentError, ConfigError
-from fivebar_sim.forces import KINDS, Constant, Csv, FootForce, ForceSpec, Stance
 from fivebar_sim.paths import Circle, Gait
+from fivebar_sim.scenario import forces
+from fivebar_sim.scenario.forces import KINDS, Constant, Csv, FootForce, ForceSpec, Stance
 
 GAIT = Gait(centre=(0.0, -0.08), stride=0.03, lift=0.02, frequency=2.0, duty=0.6, ramp=0.25)
 CIRCLE = Circle(centre=(0.0, -0.08), radius=0.01, frequency=2.0)
@@ -102,7 +102,10 @@ def test_kinds_decode_by_name_without_anything_heavy() -> None:
         assert KINDS[table["kind"]] is type(force)
         assert msgspec.convert(table, ForceSpec) == force
     assert Constant(value=(1.0, 2.0)).resolve(Path()) == Constant(value=(1.0, 2.0))
-    heavy = "import sys, fivebar_sim.forces; sys.exit(bool({'scipy', 'mujoco'} & {*sys.modules}))"
+    heavy = (
+        "import sys, fivebar_sim.scenario.forces; "
+        "sys.exit(bool({'scipy', 'mujoco'} & {*sys.modules}))"
+    )
     assert subprocess.run([sys.executable, "-c", heavy], check=False).returncode == 0
 
 

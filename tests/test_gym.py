@@ -21,7 +21,7 @@ from fivebar_sim.control.servo import Servo
 from fivebar_sim.errors import ArgumentError, ConfigError
 from fivebar_sim.gym import LegEnv
 from fivebar_sim.metrics import ground
-from fivebar_sim.scenes import Treadmill
+from fivebar_sim.scenario.scenes import Treadmill
 from fivebar_sim.tasks import KINDS
 
 ROOT = Path(__file__).resolve().parents[1]

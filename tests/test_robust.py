@@ -14,9 +14,10 @@ import pytest
 import rerun
 from shell import Shell
 
-from fivebar_sim import memory, recording_file, rollout, run_directory, scenario
+from fivebar_sim import memory, recording_file, rollout, run_directory
 from fivebar_sim.commands import status
 from fivebar_sim.files import input_file
+from fivebar_sim.scenario import scenario
 
 resource = pytest.importorskip("resource", reason="this system limits no process")
 

@@ -10,14 +10,14 @@ from pathlib import Path
 import faults_disturbed as disturbed
 import pytest
 
-from fivebar_sim import baseline, control, regression, rollout, scenes
+from fivebar_sim import baseline, control, regression, rollout
 from fivebar_sim.control.servo import Servo
 from fivebar_sim.errors import FiveBarError
 from fivebar_sim.files import resources
 from fivebar_sim.metrics import Limit
 from fivebar_sim.metrics.guards import Guards
 from fivebar_sim.rollout import Plan, Result
-from fivebar_sim.scenario import Scenario
+from fivebar_sim.scenario import Scenario, scenes
 
 NAMES = sorted(resources.shipped("scenarios"))
 SCENARIOS = {name: Scenario.load(name) for name in NAMES}

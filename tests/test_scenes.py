@@ -10,15 +10,15 @@ import numpy as np
 import pytest
 from mujoco.batch import Batch
 
-from fivebar_sim import dynamics, kinematics, model, rollout, scenes
+from fivebar_sim import dynamics, kinematics, model, rollout
 from fivebar_sim.control.servo import Servo
 from fivebar_sim.errors import ArgumentError, ConfigError, GeometryError
 from fivebar_sim.files import resources
 from fivebar_sim.geometry import FiveBar
 from fivebar_sim.integrator import Integrator
 from fivebar_sim.rollout import Result
-from fivebar_sim.scenario import Scenario
-from fivebar_sim.scenes import Air, Ground, Payload, Rail, Scene, Treadmill
+from fivebar_sim.scenario import Scenario, scenes
+from fivebar_sim.scenario.scenes import Air, Ground, Payload, Rail, Scene, Treadmill
 
 FILES = sorted((resources.folder("models") / "scenes").glob("*.xml"))
 INTEGRATORS: tuple[Integrator, ...] = get_args(Integrator)

@@ -10,9 +10,9 @@ from typing import Any, NamedTuple
 import pytest
 from shell import Shell
 
-from fivebar_sim import rollout, scenes, stored_metrics
+from fivebar_sim import rollout, stored_metrics
 from fivebar_sim.errors import RunDirectoryError
-from fivebar_sim.scenario import Scenario
+from fivebar_sim.scenario import Scenario, scenes
 
 
 class Kept(NamedTuple):

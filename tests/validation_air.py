@@ -21,13 +21,14 @@ from fivebar_sim import dynamics, kinematics, rollout
 from fivebar_sim.arrays import Array
 from fivebar_sim.control.servo import Servo
 from fivebar_sim.files import resources
-from fivebar_sim.forces import Constant
 from fivebar_sim.geometry import FiveBar
 from fivebar_sim.integrator import Integrator
 from fivebar_sim.paths import Ellipse, Line
 from fivebar_sim.rollout import Plan, Result
-from fivebar_sim.scenario import Scenario, Sim
-from fivebar_sim.scenes import Air, Scene
+from fivebar_sim.scenario import Scenario
+from fivebar_sim.scenario.forces import Constant
+from fivebar_sim.scenario.scenario import Sim
+from fivebar_sim.scenario.scenes import Air, Scene
 
 PRESETS = tuple(resources.shipped("models/legs"))
 INTEGRATORS: tuple[Integrator, ...] = ("discrete", "implicitfast")

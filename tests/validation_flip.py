@@ -12,12 +12,12 @@ from fivebar_sim import kinematics, rollout, simulate
 from fivebar_sim.arrays import Array
 from fivebar_sim.control.servo import Servo
 from fivebar_sim.errors import UnreachableError
-from fivebar_sim.forces import Constant
 from fivebar_sim.geometry import FiveBar
 from fivebar_sim.integrator import Integrator
 from fivebar_sim.paths import Line
 from fivebar_sim.rollout import Plan
-from fivebar_sim.scenes import Payload
+from fivebar_sim.scenario.forces import Constant
+from fivebar_sim.scenario.scenes import Payload
 
 FORCE = 80.0  # [N]
 GROWS, DURATION = 0.2, 0.3  # [s]

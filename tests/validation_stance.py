@@ -24,7 +24,7 @@ from fivebar_sim.integrator import Integrator
 from fivebar_sim.metrics import ground as floor
 from fivebar_sim.paths import Ellipse, Line
 from fivebar_sim.rollout import Plan, Result
-from fivebar_sim.scenes import Air, Rail, Scene
+from fivebar_sim.scenario.scenes import Air, Rail, Scene
 
 HANGING = ("classic", "doggo", "extended", "minitaur", "q8bot")
 TRUNK = 0.5  # [kg]

@@ -18,7 +18,7 @@ from fivebar_sim.errors import ArgumentError, ConfigError, unknown
 from fivebar_sim.geometry import FiveBar
 from fivebar_sim.integrator import Integrator
 from fivebar_sim.paths import FootPath
-from fivebar_sim.scenes import Ground, Scene
+from fivebar_sim.scenario.scenes import Ground, Scene
 from fivebar_sim.tasks.motion import Motion
 
 Action = Literal["position", "motion", "torque"]

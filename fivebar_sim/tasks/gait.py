@@ -7,7 +7,7 @@ from typing import ClassVar
 from fivebar_sim import paths
 from fivebar_sim.arrays import Array
 from fivebar_sim.errors import ConfigError
-from fivebar_sim.scenes import Scene, Treadmill
+from fivebar_sim.scenario.scenes import Scene, Treadmill
 from fivebar_sim.tasks.base import Grounded, Part, effort, near, periodic
 from fivebar_sim.tasks.motion import Motion
 

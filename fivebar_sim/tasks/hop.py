@@ -10,7 +10,7 @@ from fivebar_sim.arrays import Array
 from fivebar_sim.checks import check_number
 from fivebar_sim.paths import FootPath
 from fivebar_sim.paths.base import FASTEST
-from fivebar_sim.scenes import Rail, Scene
+from fivebar_sim.scenario.scenes import Rail, Scene
 from fivebar_sim.tasks.base import Grounded, Part, effort, turning
 from fivebar_sim.tasks.motion import Motion
 from fivebar_sim.tasks.stand import held

@@ -6,7 +6,7 @@ from typing import ClassVar
 
 from fivebar_sim.arrays import Array
 from fivebar_sim.paths import FootPath, Step
-from fivebar_sim.scenes import Rail, Scene
+from fivebar_sim.scenario.scenes import Rail, Scene
 from fivebar_sim.tasks.base import Grounded, Part, effort, near
 from fivebar_sim.tasks.motion import Motion
 

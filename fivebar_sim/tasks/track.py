@@ -6,7 +6,7 @@ from typing import ClassVar
 
 from fivebar_sim.arrays import Array
 from fivebar_sim.paths import Ellipse, FootPath
-from fivebar_sim.scenes import Air, Scene
+from fivebar_sim.scenario.scenes import Air, Scene
 from fivebar_sim.tasks.base import Part, Task, effort, near, periodic
 from fivebar_sim.tasks.motion import Motion
 

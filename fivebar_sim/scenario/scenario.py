@@ -10,7 +10,7 @@ from pathlib import Path
 import msgspec
 import numpy as np
 
-from fivebar_sim import forces, paths, scenario_table
+from fivebar_sim import paths
 from fivebar_sim.arrays import Array
 from fivebar_sim.control import Feedback, Setpoints
 from fivebar_sim.control.sensors import Sensors
@@ -18,13 +18,14 @@ from fivebar_sim.control.servo import Servo
 from fivebar_sim.errors import ArgumentError, ConfigError, unknown
 from fivebar_sim.files import resources, tables
 from fivebar_sim.files.tables import Table
-from fivebar_sim.forces import FootForce
 from fivebar_sim.geometry import FiveBar
 from fivebar_sim.integrator import Sim
 from fivebar_sim.metrics.catalogue import GROUND_KEYS, LIMIT_KEYS
 from fivebar_sim.metrics.guards import Guards
 from fivebar_sim.paths import FootPath, Gait
-from fivebar_sim.scenes import Air, Ground, Payload, Scene, Treadmill
+from fivebar_sim.scenario import forces, reading
+from fivebar_sim.scenario.forces import FootForce
+from fivebar_sim.scenario.scenes import Air, Ground, Payload, Scene, Treadmill
 
 MOST_STEPS = 5_000_000
 """Physics steps of one run: what its arrays need, about 600 bytes a step, must fit in memory."""
@@ -136,7 +137,7 @@ class Scenario(msgspec.Struct, frozen=True, kw_only=True):
             raise ConfigError(f"{unknown('scenario', str(source), shipped)}; or a path to a .toml")
         table = tables.read(path, "scenario")
         for setting in settings:
-            scenario_table.change(table, *tables.parse_setting(setting), str(source))
+            reading.change(table, *tables.parse_setting(setting), str(source))
         return cls.from_table({"name": path.stem, **table}, str(source), path.parent)
 
     @classmethod
@@ -148,19 +149,19 @@ class Scenario(msgspec.Struct, frozen=True, kw_only=True):
         """
         tables.check_keys(table, KEYS, where)
         tables.check_finite(table, where)
-        name, duration = scenario_table.name_and_duration(table, where)
-        controller_name, controller = scenario_table.controller(table.get("controller", {}), where)
-        path = scenario_table.path(table.get("path"), where, folder)
+        name, duration = reading.name_and_duration(table, where)
+        controller_name, controller = reading.controller(table.get("controller", {}), where)
+        path = reading.path(table.get("path"), where, folder)
         scenario = cls(
             name=name,
-            leg=scenario_table.leg(table.get("leg", "classic"), where, folder),
+            leg=reading.leg(table.get("leg", "classic"), where, folder),
             path=path,
             controller=controller,
             controller_name=controller_name,
-            scene=_belted(scenario_table.scene(table.get("scene", "air"), where), path, where),
+            scene=_belted(reading.scene(table.get("scene", "air"), where), path, where),
             duration=duration,
-            force=scenario_table.force(table.get("force"), where, folder),
-            servo=scenario_table.servo(table.get("servo", {}), where, folder),
+            force=reading.force(table.get("force"), where, folder),
+            servo=reading.servo(table.get("servo", {}), where, folder),
             sensors=tables.convert(table.get("sensors", {}), Sensors, "sensors", where),
             sim=tables.convert(table.get("sim", {}), Sim, "sim", where),
             guards=tables.convert(table.get("guards", {}), Guards, "guards", where),

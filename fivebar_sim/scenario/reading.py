@@ -7,7 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from fivebar_sim import control, forces, geometry, paths, scenes
+from fivebar_sim import control, geometry, paths
 from fivebar_sim.checks import check_number
 from fivebar_sim.control import Feedback, Setpoints
 from fivebar_sim.control.servo import Servo
@@ -15,10 +15,11 @@ from fivebar_sim.control.servo import read_table as read_servo
 from fivebar_sim.errors import ArgumentError, ConfigError, unknown
 from fivebar_sim.files import tables
 from fivebar_sim.files.tables import Table
-from fivebar_sim.forces import FootForce
 from fivebar_sim.geometry import FiveBar
 from fivebar_sim.paths import FootPath
-from fivebar_sim.scenes import Scene
+from fivebar_sim.scenario import forces, scenes
+from fivebar_sim.scenario.forces import FootForce
+from fivebar_sim.scenario.scenes import Scene
 
 NAME = re.compile(r"""(?![. ])[^/\\:*?"<>|]+(?<! )""")
 LONGEST_NAME = 200
