@@ -13,7 +13,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from fivebar_sim import gl, tasks
+from fivebar_sim import tasks
 from fivebar_sim.arrays import Array
 from fivebar_sim.checks import is_finite
 from fivebar_sim.episodes import Episodes, Outcome
@@ -21,6 +21,7 @@ from fivebar_sim.errors import ArgumentError
 from fivebar_sim.geometry import FiveBar
 from fivebar_sim.leg_group import prepared
 from fivebar_sim.model import quiet
+from fivebar_sim.render import gl
 from fivebar_sim.tasks import REASONS, Randomise, Task
 
 gl.settle()  # before dm_control loads OpenGL

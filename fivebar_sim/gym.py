@@ -16,7 +16,7 @@ from fivebar_sim.arrays import Array
 from fivebar_sim.episodes import Episodes, Outcome
 from fivebar_sim.errors import ArgumentError, unknown
 from fivebar_sim.leg_group import LegGroup
-from fivebar_sim.leg_picture import LegPicture
+from fivebar_sim.render.leg_picture import LegPicture
 from fivebar_sim.tasks import REASONS, Randomise, Task
 
 RENDER_MODES = ("rgb_array",)

@@ -7,8 +7,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from fivebar_sim import render, rollout
-from fivebar_sim.render_replay import replay
+from fivebar_sim import rollout
+from fivebar_sim.render import film as render
+from fivebar_sim.render.replay import replay
 from fivebar_sim.scenario import Scenario
 
 OUT = Path(__file__).resolve().parent.parent / "docs" / "leg.gif"

@@ -17,14 +17,11 @@ pytest.importorskip("dm_control", reason="dm-control has no wheel for this Pytho
 from dm_env import StepType, test_utils
 from env_runs import actions, played, scenario, task_of
 
-from fivebar_sim import (
-    environment,  # before dm_control: it settles which OpenGL that loads
-    gl,
-    kinematics,
-)
+from fivebar_sim import environment, kinematics
 from fivebar_sim.control.servo import Servo
 from fivebar_sim.errors import ArgumentError, ConfigError, UnreachableError
 from fivebar_sim.gym import LegEnv
+from fivebar_sim.render import gl
 from fivebar_sim.tasks import KINDS, Randomise
 
 # isort: split

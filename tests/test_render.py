@@ -17,13 +17,17 @@ import pytest
 from PIL import Image
 from shell import Shell
 
-from fivebar_sim import FiveBar, gl, kinematics, render, render_files, render_scene
+from fivebar_sim import FiveBar, kinematics
 from fivebar_sim.arrays import Array
 from fivebar_sim.errors import ConfigError, RunDirectoryError
 from fivebar_sim.files import resources
 from fivebar_sim.metrics import JOINT_COLUMNS, Record
 from fivebar_sim.model import HIP_HEIGHT
-from fivebar_sim.render_replay import Replay, Span, replay
+from fivebar_sim.render import film as render
+from fivebar_sim.render import frames as render_files
+from fivebar_sim.render import gl
+from fivebar_sim.render import scene as render_scene
+from fivebar_sim.render.replay import Replay, Span, replay
 from fivebar_sim.scenario import Scenario
 
 SMALL = ("--width", "128", "--height", "96")

@@ -13,9 +13,10 @@ import numpy as np
 import pytest
 from shell import Shell
 
-from fivebar_sim import FiveBar, kinematics, view
+from fivebar_sim import FiveBar, kinematics
 from fivebar_sim.errors import ConfigError
-from fivebar_sim.render_replay import replay
+from fivebar_sim.render import view
+from fivebar_sim.render.replay import replay
 from fivebar_sim.rollout import run
 from fivebar_sim.scenario import Scenario
 

@@ -35,13 +35,14 @@ def render(
         height: Of the picture [pixels].
         at: Moment of a .png [s] (default: the middle of the run).
     """
-    from fivebar_sim import gl, stored_run
+    from fivebar_sim import stored_run
+    from fivebar_sim.render import gl
 
     run = stored_run.read(run_dir)
     gl.find()  # before mujoco is imported, which fails where MUJOCO_GL names what is not there
 
-    from fivebar_sim import render
-    from fivebar_sim.render_replay import replay
+    from fivebar_sim.render import film as render
+    from fivebar_sim.render.replay import replay
 
     place = Path(f"{run.scenario.name}.gif" if out is None else out)
     film = render.Film(width, height, fps, speed, at)

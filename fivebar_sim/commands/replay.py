@@ -7,8 +7,8 @@ from typing import Annotated
 
 from tyro.conf import Positional, arg
 
-from fivebar_sim import screen
 from fivebar_sim.errors import ConfigError
+from fivebar_sim.render import screen
 
 RunDir = Positional[Annotated[Path, arg(metavar="RUN_DIR")]]
 RunDirs = Positional[Annotated[tuple[Path, ...], arg(metavar="[RUN_DIR ...]")]]

@@ -54,7 +54,7 @@ def run(
 def _viewer(address: str | None) -> str:
     """Return the address of a viewer that listens; None: of a new one."""
     from fivebar_sim import live
-    from fivebar_sim.screen import check
+    from fivebar_sim.render.screen import check
 
     if address is not None:
         return live.checked(address)

@@ -20,9 +20,10 @@ def view(
     Args:
         source: A scenario or a leg: a shipped name or a TOML file.
     """
-    from fivebar_sim import rollout, screen, view
+    from fivebar_sim import rollout
     from fivebar_sim.geometry import FiveBar
-    from fivebar_sim.render_replay import replay
+    from fivebar_sim.render import screen, view
+    from fivebar_sim.render.replay import replay
 
     what = view.chosen(source)
     screen.check(view.INSTEAD)

@@ -13,12 +13,13 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
-from fivebar_sim import gl, render_files, render_scene
 from fivebar_sim.checks import check_number
 from fivebar_sim.errors import ConfigError
 from fivebar_sim.files import whole_file
-from fivebar_sim.render_files import Frame
-from fivebar_sim.render_replay import Replay, Span
+from fivebar_sim.render import frames as render_files
+from fivebar_sim.render import gl, scene
+from fivebar_sim.render.frames import Frame
+from fivebar_sim.render.replay import Replay, Span
 
 FORMATS = (".gif", ".mp4", ".png")
 FASTEST = {".gif": 50.0, ".mp4": 240.0, ".png": 240.0}
@@ -137,13 +138,13 @@ class Stage:
     """
 
     def __init__(self, replay: Replay, width: int, height: int) -> None:
-        self.camera = render_scene.fit(replay, width / height)
+        self.camera = scene.fit(replay, width / height)
         self._replay, self._rect = replay, mujoco.MjrRect(0, 0, width, height)
-        render_scene.dress(replay, self.camera, max(width, height))
+        scene.dress(replay, self.camera, max(width, height))
         model = replay.model
         model.vis.global_.offwidth, model.vis.global_.offheight = width, height
         self._data = mujoco.MjData(model)
-        self.scene = mujoco.MjvScene(model, render_scene.GEOMS)
+        self.scene = mujoco.MjvScene(model, scene.GEOMS)
         self._option, self._view = mujoco.MjvOption(), mujoco.MjvCamera()
         self.camera.aim(self._view)
         self._gl = gl.context(gl.find(), width, height)
@@ -163,7 +164,7 @@ class Stage:
         mujoco.mj_forward(model, data)
         every = mujoco.mjtCatBit.mjCAT_ALL
         mujoco.mjv_updateScene(model, data, self._option, None, self._view, every, self.scene)
-        render_scene.decorate(self.scene, self._replay, row, self.camera.eye)
+        scene.decorate(self.scene, self._replay, row, self.camera.eye)
         self._gl.make_current()
         mujoco.mjr_render(self._rect, self.scene, self._mjr)
         pixels = np.empty((self._rect.height, self._rect.width, 3), np.uint8)

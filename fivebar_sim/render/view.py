@@ -14,12 +14,13 @@ import glfw
 import mujoco
 import numpy as np
 
-from fivebar_sim import model, render_scene, screen
+from fivebar_sim import model
 from fivebar_sim.control.servo import Servo
 from fivebar_sim.errors import ConfigError, unknown
 from fivebar_sim.files import resources, tables
 from fivebar_sim.geometry import FiveBar
-from fivebar_sim.render_replay import Replay
+from fivebar_sim.render import scene, screen
+from fivebar_sim.render.replay import Replay
 from fivebar_sim.scenario import Scenario
 
 INSTEAD = "`fivebar render` draws a run without one"
@@ -74,8 +75,8 @@ def play(replay: Replay, clock: Callable[[], float] = time.monotonic) -> None:
     Raises:
         ConfigError: No window can be opened.
     """
-    camera = render_scene.fit(replay, aspect=1.0)
-    render_scene.dress(replay, camera)
+    camera = scene.fit(replay, aspect=1.0)
+    scene.dress(replay, camera)
     data = mujoco.MjData(replay.model)
     with _window(replay.model, data, controls=False) as window:
         with window.lock():
@@ -88,7 +89,7 @@ def play(replay: Replay, clock: Callable[[], float] = time.monotonic) -> None:
                 data.qpos[:] = replay.qpos[row]
                 mujoco.mj_forward(replay.model, data)
                 window.user_scn.ngeom = 0
-                render_scene.decorate(window.user_scn, replay, row, camera.eye)
+                scene.decorate(window.user_scn, replay, row, camera.eye)
             window.sync()
             time.sleep(SECONDS)
 
@@ -111,7 +112,7 @@ def hold(leg: FiveBar, clock: Callable[[], float] = time.monotonic) -> None:
     middle = np.array([0.0, 0.0, (model.HIP_HEIGHT - 0.4) * leg.size])
     with _window(built, data, controls=True) as window:
         with window.lock():
-            render_scene.Camera(middle, 2.0 * leg.size, built.vis.global_.fovy).aim(window.cam)
+            scene.Camera(middle, 2.0 * leg.size, built.vis.global_.fovy).aim(window.cam)
         start = clock()
         while window.is_running():
             due = min(clock() - start, data.time + LATE)  # a slow machine falls behind the clock

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 
 from fivebar_sim import kinematics
 from fivebar_sim.arrays import Array
-from fivebar_sim.render_replay import Replay
+from fivebar_sim.render.replay import Replay
 
 FIELD, DOWN = 20.0, 9.0
 """Of the camera: vertical field of view, and how far it looks down [degrees]."""

@@ -8,10 +8,10 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from fivebar_sim import gl
 from fivebar_sim.arrays import Array
 from fivebar_sim.errors import ConfigError
 from fivebar_sim.geometry import FiveBar
+from fivebar_sim.render import gl
 
 WIDTH, HEIGHT = 640, 480
 GEOMS = 200

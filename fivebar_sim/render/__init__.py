@@ -1,0 +1,1 @@
+"""Pictures of MuJoCo's: films, a leg, the interactive viewer."""
