@@ -14,7 +14,7 @@ from fivebar_sim.episodes import Episodes, Outcome
 from fivebar_sim.errors import ArgumentError, UnreachableError
 from fivebar_sim.paths import Step
 from fivebar_sim.scenario.scenes import Ground
-from fivebar_sim.simulate import Legs
+from fivebar_sim.simulation.steps import Legs
 from fivebar_sim.tasks import Randomise, Task
 
 STARTS = 32

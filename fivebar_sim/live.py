@@ -20,13 +20,13 @@ from fivebar_sim import recording_foot as foot
 from fivebar_sim import recording_ground as ground
 from fivebar_sim import recording_scene as scene
 from fivebar_sim.errors import ConfigError
-from fivebar_sim.plan import Plan
-from fivebar_sim.record import columns
 from fivebar_sim.recording_look import Look
 from fivebar_sim.recording_motion import Motion, Stage, motion, stage
 from fivebar_sim.recording_series import Series, series
 from fivebar_sim.scenario.scenes import Ground
-from fivebar_sim.simulate import States, Watch
+from fivebar_sim.simulation.plan import Plan
+from fivebar_sim.simulation.record import columns
+from fivebar_sim.simulation.steps import States, Watch
 
 if TYPE_CHECKING:
     import rerun as rr

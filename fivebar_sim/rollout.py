@@ -9,16 +9,16 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from fivebar_sim import feedback, measure
 from fivebar_sim.errors import ArgumentError, DivergedError
 from fivebar_sim.metrics.columns import Record
 from fivebar_sim.metrics.limits import Limit, judge
 from fivebar_sim.metrics.tracking import lost_path
-from fivebar_sim.plan import Plan, period_steps, plan
-from fivebar_sim.provenance import provenance
-from fivebar_sim.record import broken, columns, unrecorded
 from fivebar_sim.scenario import Scenario
-from fivebar_sim.simulate import States, Watch, check, simulate
+from fivebar_sim.simulation import feedback, measure
+from fivebar_sim.simulation.plan import Plan, period_steps, plan
+from fivebar_sim.simulation.provenance import provenance
+from fivebar_sim.simulation.record import broken, columns, unrecorded
+from fivebar_sim.simulation.steps import States, Watch, check, simulate
 
 
 class Result(NamedTuple):

@@ -68,7 +68,7 @@ ROOMS = {
     ),
     "metrics": Room(
         (
-            "fivebar_sim/measure.py",
+            "fivebar_sim/simulation/measure.py",
             "fivebar_sim/metrics/tracking.py",
             "fivebar_sim/metrics/load.py",
             "fivebar_sim/metrics/ground.py",

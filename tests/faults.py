@@ -16,9 +16,9 @@ import numpy as np
 import pytest
 
 from fivebar_sim import model, rollout
-from fivebar_sim import plan as planning
 from fivebar_sim.arrays import Array
-from fivebar_sim.simulate import Legs
+from fivebar_sim.simulation import plan as planning
+from fivebar_sim.simulation.steps import Legs
 
 Put = Callable[[pytest.MonkeyPatch], None]
 Change = Callable[[Any], None]

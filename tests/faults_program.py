@@ -15,13 +15,14 @@ from controllers.computed_torque import ComputedTorque
 from controllers.impedance import Impedance
 from controllers.pd import Pd
 from controllers.servo import Servo as Planned
-from fivebar_sim import dynamics, feedback, kinematics, measure, motion, record, rollout
-from fivebar_sim import plan as planning
+from fivebar_sim import dynamics, kinematics, motion, rollout
 from fivebar_sim.control.servo import Servo
 from fivebar_sim.control.step import ControlStep
 from fivebar_sim.metrics import ground
 from fivebar_sim.paths import Ellipse, Gait, base, csv, shapes
 from fivebar_sim.scenario import Scenario
+from fivebar_sim.simulation import feedback, measure, record
+from fivebar_sim.simulation import plan as planning
 
 Right = Callable[..., Any]
 

@@ -13,10 +13,10 @@ from fivebar_sim.files import resources
 from fivebar_sim.geometry import FiveBar
 from fivebar_sim.metrics import energy
 from fivebar_sim.metrics.energy import Body, Steps
-from fivebar_sim.record import unrecorded
 from fivebar_sim.rollout import Plan, Result
 from fivebar_sim.scenario import Scenario
 from fivebar_sim.scenario.scenes import Ground, Payload, Rail
+from fivebar_sim.simulation.record import unrecorded
 
 PRESETS = tuple(resources.shipped("models/legs"))
 INTEGRATORS = ("discrete", "implicitfast")

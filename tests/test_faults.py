@@ -27,7 +27,7 @@ from fivebar_sim.files import resources
 from fivebar_sim.metrics import look_up
 from fivebar_sim.rollout import Result
 from fivebar_sim.scenario import Scenario
-from fivebar_sim.simulate import Legs
+from fivebar_sim.simulation.steps import Legs
 
 FAULTS = (*MODEL, *PROGRAM)
 NAMES = sorted(resources.shipped("scenarios"))

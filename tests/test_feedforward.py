@@ -15,7 +15,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from controllers.servo import Servo as Law
-from fivebar_sim import dynamics, kinematics, model, motion, simulate
+from fivebar_sim import dynamics, kinematics, model, motion
 from fivebar_sim.arrays import Array
 from fivebar_sim.control.servo import Servo
 from fivebar_sim.files import resources
@@ -23,6 +23,7 @@ from fivebar_sim.geometry import FiveBar
 from fivebar_sim.integrator import Integrator
 from fivebar_sim.paths import Csv, Ellipse, PathSpec
 from fivebar_sim.scenario.scenes import Payload
+from fivebar_sim.simulation import steps as simulate
 
 CLASSIC = FiveBar.load("classic")
 PRESETS = {name: FiveBar.load(name) for name in resources.shipped("models/legs")}

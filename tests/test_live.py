@@ -14,9 +14,10 @@ import rerun as rr
 from recorded import read
 from shell import Shell
 
-from fivebar_sim import live, recording_viewer, rollout, simulate
+from fivebar_sim import live, recording_viewer, rollout
 from fivebar_sim.errors import ConfigError
 from fivebar_sim.scenario import Scenario
+from fivebar_sim.simulation import steps
 
 RUNS = {
     "setpoints": ("classic-ellipse", ["duration=0.9"]),
@@ -35,8 +36,8 @@ def kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         self.save(file)
 
     monkeypatch.setattr(rr.RecordingStream, "connect_grpc", keep)
-    monkeypatch.setattr(simulate, "WATCHED", 130)
-    monkeypatch.setattr(simulate, "GLANCE", 0.0)
+    monkeypatch.setattr(steps, "WATCHED", 130)
+    monkeypatch.setattr(steps, "GLANCE", 0.0)
     return file
 
 

@@ -8,13 +8,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from fivebar_sim import kinematics, measure, metrics
+from fivebar_sim import kinematics, metrics
 from fivebar_sim.arrays import Array, Bools
 from fivebar_sim.errors import ArgumentError
 from fivebar_sim.geometry import FiveBar
 from fivebar_sim.metrics import energy, ground, guards, load
 from fivebar_sim.paths import Gait
 from fivebar_sim.scenario import Scenario
+from fivebar_sim.simulation import measure
 
 LEG = FiveBar.load("classic")
 ROWS = 1000

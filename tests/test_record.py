@@ -12,14 +12,15 @@ import pyarrow.parquet
 import pytest
 from shell import Shell
 
-from fivebar_sim import kinematics, metrics, record, rollout
+from fivebar_sim import kinematics, metrics, rollout
 from fivebar_sim.arrays import Array
 from fivebar_sim.errors import ConfigError
 from fivebar_sim.metrics import load
 from fivebar_sim.metrics.catalogue import SHOWN, shown
 from fivebar_sim.rollout import Plan, Result
 from fivebar_sim.scenario import Scenario
-from fivebar_sim.simulate import simulate
+from fivebar_sim.simulation import record
+from fivebar_sim.simulation.steps import simulate
 
 COLUMNS = (
     "time target_x target_z foot_x foot_z theta_A theta_B theta_E theta_D theta_dot_A theta_dot_B "

@@ -14,10 +14,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from fivebar_sim import rollout, simulate
+from fivebar_sim import rollout
 from fivebar_sim.files import resources
 from fivebar_sim.rollout import Plan, Result
 from fivebar_sim.scenario import Scenario
+from fivebar_sim.simulation import steps
 
 NAMES = sorted(resources.shipped("scenarios"))
 SCRIPTS = Path(__file__).parents[1] / "scripts"
@@ -53,7 +54,7 @@ def test_two_of_each_together_on_two_threads(alone: list[Result]) -> None:
 
 def test_by_plain_steps(alone: list[Result], monkeypatch: pytest.MonkeyPatch) -> None:
     """One mj_step after the other, as whoever has no `mujoco.batch` would write it."""
-    monkeypatch.setattr(simulate, "Batch", runpy.run_path(str(WORKER))["Plain"])
+    monkeypatch.setattr(steps, "Batch", runpy.run_path(str(WORKER))["Plain"])
     for result in alone:
         same_bits(rollout.run(result.scenario), result)
 

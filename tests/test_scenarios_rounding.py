@@ -16,7 +16,7 @@ from fivebar_sim.arrays import Array
 from fivebar_sim.files import resources
 from fivebar_sim.rollout import Plan, Result
 from fivebar_sim.scenario import Scenario
-from fivebar_sim.simulate import Legs, States
+from fivebar_sim.simulation.steps import Legs, States
 
 NAMES = sorted(resources.shipped("scenarios"))
 

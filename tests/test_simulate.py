@@ -7,11 +7,12 @@ import numpy as np
 import pytest
 from mujoco.batch import Batch
 
-from fivebar_sim import rollout, simulate
+from fivebar_sim import rollout
 from fivebar_sim.errors import ArgumentError, DivergedError
 from fivebar_sim.rollout import Plan
 from fivebar_sim.scenario import Scenario
-from fivebar_sim.simulate import States
+from fivebar_sim.simulation import steps
+from fivebar_sim.simulation.steps import States
 
 INTEGRATORS = ("discrete", "implicitfast")
 
@@ -63,7 +64,7 @@ def test_torque_balances_momentum_at_every_step(integrator: str, limit: float | 
 
 
 def simulated(plan: Plan) -> States:
-    return simulate.simulate(plan.model, plan.motion.q[:1], plan.ctrl[None])
+    return steps.simulate(plan.model, plan.motion.q[:1], plan.ctrl[None])
 
 
 def test_raw_sensor_is_not_the_torque() -> None:
@@ -105,7 +106,7 @@ def test_batch_is_bit_identical_to_a_plain_loop() -> None:
 def test_chunks_give_the_bits_of_one_piece(monkeypatch: pytest.MonkeyPatch) -> None:
     plan = planned("duration=1.0")
     whole = simulated(plan)
-    monkeypatch.setattr(simulate, "CHUNK", 77)
+    monkeypatch.setattr(steps, "CHUNK", 77)
     for one, other in zip(whole, simulated(plan), strict=True):
         np.testing.assert_array_equal(one, other)
 
@@ -115,11 +116,11 @@ def test_refusal_of_setpoints_that_are_not_finite() -> None:
     ctrl = plan.ctrl.copy()
     ctrl[7, 1] = np.nan
     with pytest.raises(ArgumentError, match="ctrl must be finite"):
-        simulate.simulate(plan.model, plan.motion.q[:1], ctrl[None])
+        steps.simulate(plan.model, plan.motion.q[:1], ctrl[None])
     with pytest.raises(ArgumentError, match=r"qpos must have shape \(nsim, 4\), got \(1, 3\)"):
-        simulate.simulate(plan.model, plan.motion.q[:1, :3], plan.ctrl[None])
+        steps.simulate(plan.model, plan.motion.q[:1, :3], plan.ctrl[None])
     with pytest.raises(ArgumentError, match=r"ctrl must have shape \(1, N, 2\)"):
-        simulate.simulate(plan.model, plan.motion.q[:1], ctrl)
+        steps.simulate(plan.model, plan.motion.q[:1], ctrl)
 
 
 def states(**changes: np.ndarray) -> States:
@@ -134,7 +135,7 @@ def states(**changes: np.ndarray) -> States:
         iterations=np.ones((1, 10)),
         warnings=np.zeros(1, dtype=int),
     )
-    simulate.check(good, 1e-3)
+    steps.check(good, 1e-3)
     return good._replace(**changes)
 
 
@@ -152,5 +153,5 @@ def test_refusal_of_each_breakdown() -> None:
         (states(warnings=np.array([2])), 0.010),
     ):
         with pytest.raises(DivergedError) as caught:
-            simulate.check(bad, 1e-3)
+            steps.check(bad, 1e-3)
         assert caught.value.time == pytest.approx(time)

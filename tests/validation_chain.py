@@ -10,10 +10,11 @@ import oracle
 import test_dynamics as pose_tests
 import test_dynamics_motion as motion_tests
 
-from fivebar_sim import dynamics, kinematics, model, simulate
+from fivebar_sim import dynamics, kinematics, model
 from fivebar_sim.arrays import Array
 from fivebar_sim.control.servo import Servo
 from fivebar_sim.integrator import Integrator
+from fivebar_sim.simulation import steps
 
 LEG, SLACK, START = motion_tests.LEG, motion_tests.SLACK, motion_tests.START
 STIFFNESS = motion_tests.STIFFNESS
@@ -83,8 +84,8 @@ def swing(integrator: Integrator, timestep: float) -> Swing:
     foot, rest = kinematics.forward(LEG, START)[None], np.zeros((1, 2))
     q = kinematics.joint_motion(LEG, foot, rest, rest).q
     ctrl = np.broadcast_to(SLACK, (1, round(SECONDS / timestep), 2))
-    states = simulate.simulate(mj, q, ctrl)
-    simulate.check(states, timestep)
+    states = steps.simulate(mj, q, ctrl)
+    steps.check(states, timestep)
     theta, theta_dot = (rows[0][:, ::2] for rows in (states.qpos, states.qvel))
     return Swing(states.time[0], _fraction(theta, theta_dot))
 

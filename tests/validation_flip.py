@@ -8,7 +8,7 @@ import numpy as np
 import validation_air as air
 from validation_air import Key
 
-from fivebar_sim import kinematics, rollout, simulate
+from fivebar_sim import kinematics, rollout
 from fivebar_sim.arrays import Array
 from fivebar_sim.control.servo import Servo
 from fivebar_sim.errors import UnreachableError
@@ -18,6 +18,7 @@ from fivebar_sim.paths import Line
 from fivebar_sim.rollout import Plan
 from fivebar_sim.scenario.forces import Constant
 from fivebar_sim.scenario.scenes import Payload
+from fivebar_sim.simulation import steps
 
 FORCE = 80.0  # [N]
 GROWS, DURATION = 0.2, 0.3  # [s]
@@ -87,15 +88,13 @@ def push(
     leg = FiveBar.load(preset)
     asked = (held(leg, f, up, servo, integrator, timestep) for f in places(leg, cells))
     plans = [plan for plan in asked if plan is not None]
-    states = simulate.simulate(
+    states = steps.simulate(
         [plan.model for plan in plans],
         np.stack([plan.start for plan in plans]),
         np.stack([plan.ctrl for plan in plans]),
         nthread=2,
     )
-    broken = np.array(
-        [simulate.is_broken(states.rows([i]), slice(None)) for i in range(len(plans))]
-    )
+    broken = np.array([steps.is_broken(states.rows([i]), slice(None)) for i in range(len(plans))])
     q = np.where(broken[:, None, None], states.qpos[:, :1], states.qpos)
     points = kinematics.chain_points(leg, q)
     s_A, s_E, assembly = kinematics.branch(leg, points)

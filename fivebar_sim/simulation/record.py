@@ -9,13 +9,13 @@ from fivebar_sim.arrays import Array, Bools
 from fivebar_sim.control.servo import Drive, applied_torque
 from fivebar_sim.control.servo import saturated as clipped
 from fivebar_sim.errors import DivergedError
-from fivebar_sim.measure import Unrecorded
 from fivebar_sim.metrics import energy
 from fivebar_sim.metrics.columns import JOINT_COLUMNS, Record
 from fivebar_sim.metrics.tracking import left_path
-from fivebar_sim.plan import Plan
 from fivebar_sim.scenario.scenes import Ground, Treadmill
-from fivebar_sim.simulate import States
+from fivebar_sim.simulation.measure import Unrecorded
+from fivebar_sim.simulation.plan import Plan
+from fivebar_sim.simulation.steps import States
 
 MOTORS = [0, 2]
 """Where the four joints have A and E."""

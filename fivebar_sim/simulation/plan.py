@@ -7,7 +7,7 @@ from typing import NamedTuple, cast
 import mujoco
 import numpy as np
 
-from fivebar_sim import holding, model, motion
+from fivebar_sim import model, motion
 from fivebar_sim.arrays import Array
 from fivebar_sim.control import Feedback, Setpoints
 from fivebar_sim.control.step import whole_steps
@@ -15,6 +15,7 @@ from fivebar_sim.errors import ConfigError, FiveBarError
 from fivebar_sim.motion import Motion
 from fivebar_sim.scenario import Scenario
 from fivebar_sim.scenario.scenes import Ground, Payload
+from fivebar_sim.simulation import holding
 
 
 class Plan(NamedTuple):

@@ -12,9 +12,9 @@ from fivebar_sim.control import Feedback, Reference
 from fivebar_sim.control.step import ControlStep
 from fivebar_sim.errors import ConfigError, DivergedError, FiveBarError, PoseError
 from fivebar_sim.motion import Motion
-from fivebar_sim.plan import Plan, period_steps
-from fivebar_sim.record import broken
-from fivebar_sim.simulate import States, Watch, check, is_broken, simulate_asking
+from fivebar_sim.simulation.plan import Plan, period_steps
+from fivebar_sim.simulation.record import broken
+from fivebar_sim.simulation.steps import States, Watch, check, is_broken, simulate_asking
 
 MOTORS = [-4, -2]
 """Where qpos and qvel have A and E."""
