@@ -9,8 +9,9 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
-from fivebar_sim import recording, recording_check, stored_run
+from fivebar_sim import stored_run
 from fivebar_sim.errors import ConfigError
+from fivebar_sim.recording import check, rrd
 
 RECORDING = "recording.rrd"
 
@@ -37,7 +38,7 @@ def opened(paths: Sequence[Path]) -> Iterator[Path]:
             yield _own(runs[0], Path(folder))
             return
         file = Path(folder) / RECORDING
-        recording.write(file, runs, labels)
+        rrd.write(file, runs, labels)
         yield file
 
 
@@ -64,12 +65,12 @@ def _own(run: stored_run.StoredRun, folder: Path) -> Path:
         handle, name = tempfile.mkstemp(prefix=f".{RECORDING}.", suffix=".partial", dir=run.path)
     except OSError:  # a directory that one may not write in
         file = folder / RECORDING
-        recording.write(file, [run])
+        rrd.write(file, [run])
         return file
     os.close(handle)
     beside = Path(name)
     try:
-        recording.write(beside, [run])
+        rrd.write(beside, [run])
         beside.chmod(0o644)
         beside.replace(own)
     finally:
@@ -82,7 +83,7 @@ def readable(path: Path) -> bool:
 
     One of a newer Rerun counts as unreadable: what it cannot read of that it skips with a warning.
     """
-    return path.is_file() and not newer(path) and recording_check.reads(path)
+    return path.is_file() and not newer(path) and check.reads(path)
 
 
 def newer(path: Path) -> bool:

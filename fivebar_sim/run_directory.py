@@ -12,10 +12,10 @@ from pathlib import Path
 
 import tomli_w
 
-from fivebar_sim import recording
 from fivebar_sim.arrays import Array
 from fivebar_sim.errors import RunDirectoryError
 from fivebar_sim.files import leftovers
+from fivebar_sim.recording import rrd
 
 FILES = ("scenario.toml", "metrics.json", "rollout.parquet", "recording.rrd")
 
@@ -27,7 +27,7 @@ OVERTAKEN = {errno.ENOENT, errno.ENOTEMPTY, errno.EEXIST}
 """What a rename fails with if another one came in between."""
 
 
-def write(result: recording.Run, path: Path) -> Path:
+def write(result: rrd.Run, path: Path) -> Path:
     """Write a run directory: beside its place first, then renamed, so that it is never half there.
 
     An existing run directory (or an empty one) is exchanged; anything else there is refused.
@@ -92,7 +92,7 @@ def check_run(path: Path) -> None:
         raise RunDirectoryError(f"{path} is no run directory: {what}")
 
 
-def _fill(stage: Path, result: recording.Run) -> None:
+def _fill(stage: Path, result: rrd.Run) -> None:
     """Write the files of a run into an empty directory."""
     scenario = result.scenario
     (stage / "scenario.toml").write_text(tomli_w.dumps(scenario.table()), encoding="utf-8")
@@ -101,7 +101,7 @@ def _fill(stage: Path, result: recording.Run) -> None:
     text = json.dumps(result.metrics, indent=2, allow_nan=False)
     (stage / "metrics.json").write_text(text + "\n", encoding="utf-8")
     write_record(stage / "rollout.parquet", result.record)
-    recording.write(stage / "recording.rrd", [result])
+    rrd.write(stage / "recording.rrd", [result])
 
 
 def write_record(path: Path, record: Mapping[str, Array]) -> None:

@@ -10,8 +10,9 @@ import statistics
 import subprocess
 import time
 
-from fivebar_sim import live, recording_viewer, rollout
+from fivebar_sim import rollout
 from fivebar_sim.errors import ConfigError
+from fivebar_sim.recording import live, viewer
 from fivebar_sim.scenario import Scenario
 
 PORT = 9877
@@ -44,15 +45,15 @@ def measure(address: str) -> tuple[float, float]:
 
 
 if __name__ == "__main__":
-    bind = ["--serve-grpc", "--bind", recording_viewer.LOOPBACK, "--port", str(PORT)]
+    bind = ["--serve-grpc", "--bind", viewer.LOOPBACK, "--port", str(PORT)]
     server = subprocess.Popen(
-        [str(recording_viewer.binary()), *bind],
-        env=recording_viewer.quiet(),
+        [str(viewer.binary()), *bind],
+        env=viewer.quiet(),
         stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL,
     )
     try:
-        alone, streamed = measure(listening(f"{recording_viewer.LOOPBACK}:{PORT}"))
+        alone, streamed = measure(listening(f"{viewer.LOOPBACK}:{PORT}"))
     finally:
         server.kill()
         server.wait()

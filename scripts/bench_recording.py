@@ -13,11 +13,12 @@ from pathlib import Path
 import numpy as np
 import rerun as rr
 
-from fivebar_sim import recording, rollout
-from fivebar_sim import recording_scene as scene
-from fivebar_sim.recording_foot import TRAIL
-from fivebar_sim.recording_motion import drawn_rows, motion
-from fivebar_sim.recording_series import series
+from fivebar_sim import rollout
+from fivebar_sim.recording import leg as scene
+from fivebar_sim.recording import rrd
+from fivebar_sim.recording.foot import TRAIL
+from fivebar_sim.recording.plots import series
+from fivebar_sim.recording.poses import drawn_rows, motion
 from fivebar_sim.rollout import Result
 from fivebar_sim.scenario import Scenario
 
@@ -27,7 +28,7 @@ def by_columns(path: Path, result: Result) -> float:
     taken = []
     for _ in range(3):
         start = time.perf_counter()
-        recording.write(path, [result])
+        rrd.write(path, [result])
         taken.append(time.perf_counter() - start)
     return min(taken)
 
@@ -66,7 +67,7 @@ if __name__ == "__main__":
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "a.rrd"
         short = rollout.run(Scenario.load("classic-ellipse", ["duration=10.0"]))
-        recording.write(path, [short])  # the imports
+        rrd.write(path, [short])  # the imports
         columns, size = by_columns(path, short), path.stat().st_size
         rows = row_by_row(path.with_name("rows.rrd"), short)
         rows_size = path.with_name("rows.rrd").stat().st_size

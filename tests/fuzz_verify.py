@@ -13,7 +13,7 @@ import pyarrow.parquet
 from fivebar_sim import rollout, run_directory
 from fivebar_sim.arrays import Array
 from fivebar_sim.metrics import look_up
-from fivebar_sim.recording_check import read_through
+from fivebar_sim.recording.check import read_through
 from fivebar_sim.scenario import Scenario
 
 Record = dict[str, Array]

@@ -11,9 +11,10 @@ import msgspec
 import numpy as np
 from rerun.chunk import RrdReader
 
-from fivebar_sim import kinematics, recording
+from fivebar_sim import kinematics
 from fivebar_sim.arrays import Array
 from fivebar_sim.geometry import FiveBar
+from fivebar_sim.recording import rrd
 from fivebar_sim.scenario import Scenario
 
 # all lengths different, so that a swap of two links is seen
@@ -66,7 +67,7 @@ def drawn(leg: FiveBar, record: Record, source: str = "classic-ellipse", **chang
 
 
 def written(path: Path, leg: FiveBar, record: Record) -> Path:
-    recording.write(path, [drawn(leg, record)])
+    rrd.write(path, [drawn(leg, record)])
     return path
 
 

@@ -10,7 +10,7 @@ from typing import NoReturn
 import pytest
 from shell import CSV, ELLIPSE, Shell
 
-from fivebar_sim import recording
+from fivebar_sim.recording import rrd
 from fivebar_sim.run_directory import FILES
 
 FROM_CSV = ["--set", "path.kind=csv", "--set", "path.file=foot.csv"]
@@ -192,7 +192,7 @@ def test_trouble_while_writing_leaves_the_old_run(
     def broken(*args: object) -> NoReturn:
         raise error
 
-    monkeypatch.setattr(recording, "write", broken)
+    monkeypatch.setattr(rrd, "write", broken)
     interrupted = isinstance(error, KeyboardInterrupt)
     said = shell.refused("run", "short.toml", "--out", "mine", status=130 if interrupted else 2)
     assert said == ("interrupted" if interrupted else "cannot write mine: No space left")

@@ -17,8 +17,9 @@ from fuzz_damage import Damage
 from hypothesis import strategies as st
 from shell import ELLIPSE
 
-from fivebar_sim import recording_check, rollout
-from fivebar_sim.recording_check import read_through
+from fivebar_sim import rollout
+from fivebar_sim.recording import check
+from fivebar_sim.recording.check import read_through
 from fivebar_sim.recording_file import RECORDING
 from fivebar_sim.scenario import Scenario
 
@@ -77,7 +78,7 @@ def any_replay(bench: Bench, damage: Damage) -> None:
     _damaged(place, damage)
     with pytest.MonkeyPatch.context() as patch:
         if RECORDING not in (damage.file, damage.other):  # a process for each would take too long
-            patch.setattr(recording_check, "reads", _reads_here)
+            patch.setattr(check, "reads", _reads_here)
         said = bench.lawful("replay", "mine")
     assert said.status == 2  # no screen, at the best
     if "no screen here" in said.err:

@@ -14,8 +14,10 @@ import rerun as rr
 from recorded import read
 from shell import Shell
 
-from fivebar_sim import live, recording_viewer, rollout
+from fivebar_sim import rollout
 from fivebar_sim.errors import ConfigError
+from fivebar_sim.recording import live
+from fivebar_sim.recording import viewer as recording_viewer
 from fivebar_sim.scenario import Scenario
 from fivebar_sim.simulation import steps
 
@@ -109,7 +111,7 @@ def test_trouble_while_sending_reaches_the_caller(
     def fail(*args: object) -> None:
         raise OSError("no room")
 
-    monkeypatch.setattr("fivebar_sim.recording.send_series", fail)
+    monkeypatch.setattr("fivebar_sim.recording.rrd.send_series", fail)
     plan = rollout.plan(Scenario.load("classic-ellipse", ["duration=0.9"]))
     with pytest.raises(OSError, match="no room"), live.streaming(plan, "127.0.0.1:9876") as watch:
         rollout.execute(plan, watch)

@@ -17,7 +17,7 @@ import rerun as rr
 from recorded import COAXIAL, LEG, digest, drawn, ellipse, read, standing, written
 from rerun.chunk import RrdReader
 
-from fivebar_sim import recording
+from fivebar_sim.recording import rrd
 
 
 def test_times_are_exact_and_nothing_else_is_a_timeline(tmp_path: Path) -> None:
@@ -119,10 +119,10 @@ def test_equal_runs_have_equal_content(tmp_path: Path) -> None:
 
 def test_several_runs_lie_over_each_other(tmp_path: Path) -> None:
     runs = [drawn(LEG, ellipse(LEG, 40)), drawn(COAXIAL, standing(ellipse(COAXIAL, 60, 0.002)))]
-    recording.write(tmp_path / "a.rrd", runs, ["one", "two"])
+    rrd.write(tmp_path / "a.rrd", runs, ["one", "two"])
     moving, static = read(tmp_path / "a.rrd")
     for k, (run, label) in enumerate(zip(runs, ("one", "two"), strict=True), start=1):
-        recording.write(tmp_path / "own.rrd", [run])
+        rrd.write(tmp_path / "own.rrd", [run])
         own, still = read(tmp_path / "own.rrd")
         for entity, columns in own.items():
             if entity not in ("/ground_force", "/belt"):  # made for the room of all runs
@@ -184,7 +184,7 @@ def test_two_at_a_time_stay_apart(tmp_path: Path) -> None:
 
 def test_rerun_switched_off_is_an_error(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("RERUN", "off")
-    with pytest.raises(recording.RerunDisabledError, match="got 'off'"):
+    with pytest.raises(rrd.RerunDisabledError, match="got 'off'"):
         written(tmp_path / "a.rrd", LEG, ellipse(LEG, 5))
 
 

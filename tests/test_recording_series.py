@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from recorded import LEG, Record, drawn, ellipse, read, standing, written
 
-from fivebar_sim import recording
 from fivebar_sim.control.servo import Servo
 from fivebar_sim.metrics import ground
-from fivebar_sim.recording_series import SHARE_FLOOR, load_share
+from fivebar_sim.recording import rrd
+from fivebar_sim.recording.plots import SHARE_FLOOR, load_share
 
 ANGLES = ["theta_A", "theta_B", "theta_E", "theta_D"]
 
@@ -19,7 +19,7 @@ ANGLES = ["theta_A", "theta_B", "theta_E", "theta_D"]
 def lines_of(tmp_path: Path, record: Record, **changes: object) -> dict[str, Record]:
     """Return the lines of every plot of a run, by entity and by name."""
     source = str(changes.pop("source", "classic-ellipse"))
-    recording.write(tmp_path / "a.rrd", [drawn(LEG, record, source, **changes)])
+    rrd.write(tmp_path / "a.rrd", [drawn(LEG, record, source, **changes)])
     moving, static = read(tmp_path / "a.rrd")
     drawn_lines = {}
     for entity, columns in static.items():

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from recorded import LEG, METRICS, ellipse, read, written
 
-from fivebar_sim.recording_summary import summary
+from fivebar_sim.recording.summary import summary
 from fivebar_sim.scenario import Scenario
 
 LIMITS = {"tracking.rms": (-math.inf, 1e-3), "closure.max": (0.0, 1e-6), "load.share_A": (0.4, 0.6)}

@@ -7,12 +7,12 @@ from pathlib import Path
 
 import pytest
 
-from fivebar_sim import recording_viewer
 from fivebar_sim.errors import FiveBarError
+from fivebar_sim.recording import viewer
 
 
 def test_viewer_is_the_binary_and_binds_the_loopback(tmp_path: Path) -> None:
-    command = recording_viewer.native(tmp_path / "a.rrd")
+    command = viewer.native(tmp_path / "a.rrd")
     assert command[-1] == str((tmp_path / "a.rrd").resolve())
     assert command[command.index("--bind") + 1] == "127.0.0.1"
     shown = subprocess.run([command[0], "--help"], capture_output=True, text=True, check=True)
@@ -22,8 +22,8 @@ def test_viewer_is_the_binary_and_binds_the_loopback(tmp_path: Path) -> None:
 
 def test_missing_viewer_is_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
-    with pytest.raises(recording_viewer.ViewerMissingError, match="rerun_cli") as caught:
-        recording_viewer.native(Path("a.rrd"))
+    with pytest.raises(viewer.ViewerMissingError, match="rerun_cli") as caught:
+        viewer.native(Path("a.rrd"))
     assert isinstance(caught.value, FiveBarError)
     assert isinstance(caught.value, FileNotFoundError)
 
@@ -40,7 +40,7 @@ def test_web_files_are_taken_over_the_loopback_and_the_source_ends(
         return started[-1]
 
     monkeypatch.setattr(subprocess, "Popen", start)
-    files = recording_viewer.web_files()
+    files = viewer.web_files()
     assert files["re_viewer_bg.wasm"][:4] == b"\0asm"
     assert b"wasm_bindgen" in files["re_viewer.js"]
     assert [source.returncode is not None for source in started] == [True]
@@ -60,6 +60,6 @@ def test_a_binary_without_a_web_viewer_is_an_error(
     binary = tmp_path / "rerun"
     binary.write_text(f"#!/bin/sh\n{script}\n", encoding="utf-8")
     binary.chmod(0o755)
-    monkeypatch.setattr(recording_viewer, "binary", lambda: binary)
-    with pytest.raises(recording_viewer.ViewerMissingError, match=said):
-        recording_viewer.web_files()
+    monkeypatch.setattr(viewer, "binary", lambda: binary)
+    with pytest.raises(viewer.ViewerMissingError, match=said):
+        viewer.web_files()

@@ -14,8 +14,9 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
-from fivebar_sim import recording, rollout, run_directory
+from fivebar_sim import rollout, run_directory
 from fivebar_sim.errors import RunDirectoryError
+from fivebar_sim.recording import rrd
 from fivebar_sim.rollout import Result
 from fivebar_sim.run_directory import FILES
 from fivebar_sim.scenario import Scenario
@@ -198,7 +199,7 @@ def test_full_disk_leaves_what_was_there(
     def full(*args: object) -> NoReturn:
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
-    monkeypatch.setattr(recording, "write", full)
+    monkeypatch.setattr(rrd, "write", full)
     with pytest.raises(RunDirectoryError) as caught:
         result.write(where)
     assert str(caught.value) == f"cannot write {where}: No space left on device"

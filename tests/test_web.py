@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from fivebar_sim import web
 from fivebar_sim.errors import ArgumentError, ConfigError
+from fivebar_sim.recording import web
 
 FILES = {"re_viewer.js": b"js", "re_viewer_bg.wasm": b"\0asm", "favicon.ico": b"icon"}
 

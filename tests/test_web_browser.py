@@ -20,9 +20,10 @@ import matplotlib.image
 import numpy as np
 import pytest
 
-from fivebar_sim import recording, rollout, web
+from fivebar_sim import rollout
 from fivebar_sim.arrays import Array, Bools
-from fivebar_sim.recording_look import BLUE, LIGHT_BLUE, LIGHT_ORANGE, ORANGE, Colour
+from fivebar_sim.recording import rrd, web
+from fivebar_sim.recording.look import BLUE, LIGHT_BLUE, LIGHT_ORANGE, ORANGE, Colour
 from fivebar_sim.scenario import Scenario
 
 if TYPE_CHECKING:
@@ -78,7 +79,7 @@ def test_the_leg_is_in_sight_and_nothing_leaves_the_machine(browser: str, tmp_pa
     from playwright.sync_api import sync_playwright
 
     result = rollout.run(Scenario.load("classic-ellipse", ["duration=0.8"]))
-    recording.write(tmp_path / "a.rrd", [result])
+    rrd.write(tmp_path / "a.rrd", [result])
     asked: list[str] = []
     with web.Server(0) as server, sync_playwright() as driver:
         server.pages = web.pages(tmp_path / "a.rrd", "ellipse")

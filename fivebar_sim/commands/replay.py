@@ -35,18 +35,20 @@ def _show(run_dirs: tuple[Path, ...]) -> int:
     """Show the recording in the native viewer, until it is closed."""
     import subprocess
 
-    from fivebar_sim import recording_file, recording_viewer
+    from fivebar_sim import recording_file
+    from fivebar_sim.recording import viewer
 
     with recording_file.opened(run_dirs) as file:
-        command = recording_viewer.native(file)
+        command = viewer.native(file)
         shown = f"`fivebar replay {' '.join(map(str, run_dirs))} --web` shows it in a browser"
         screen.check(shown)
-        return subprocess.run(command, env=recording_viewer.quiet()).returncode
+        return subprocess.run(command, env=viewer.quiet()).returncode
 
 
 def _serve(run_dirs: tuple[Path, ...], port: int) -> int:
     """Serve the recording to browsers, until Ctrl-C, which is the way to end it: status 0."""
-    from fivebar_sim import recording_file, signals, web
+    from fivebar_sim import recording_file, signals
+    from fivebar_sim.recording import web
 
     title = " + ".join(recording_file.called(run_dirs))
     try:

@@ -53,7 +53,7 @@ def run(
 
 def _viewer(address: str | None) -> str:
     """Return the address of a viewer that listens; None: of a new one."""
-    from fivebar_sim import live
+    from fivebar_sim.recording import live
     from fivebar_sim.render.screen import check
 
     if address is not None:
@@ -68,7 +68,7 @@ def _execute(planned: Plan, viewer: str | None) -> Result:
 
     if viewer is None:
         return rollout.execute(planned)
-    from fivebar_sim import live
+    from fivebar_sim.recording import live
 
     with live.streaming(planned, viewer) as watch:
         return rollout.execute(planned, watch)

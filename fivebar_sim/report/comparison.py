@@ -13,7 +13,7 @@ from fivebar_sim.metrics import ground
 from fivebar_sim.metrics.catalogue import SHOWN, shown
 from fivebar_sim.metrics.limits import bounds, look_up
 from fivebar_sim.metrics.tracking import tracking_error
-from fivebar_sim.recording_series import points
+from fivebar_sim.recording.plots import points
 from fivebar_sim.report import draw, html, numbers
 from fivebar_sim.report.draw import Drawn
 from fivebar_sim.report.html import Cell, plain, text

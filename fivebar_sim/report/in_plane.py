@@ -12,7 +12,7 @@ from fivebar_sim.arrays import Array
 from fivebar_sim.metrics.catalogue import shown
 from fivebar_sim.metrics.columns import JOINT_COLUMNS
 from fivebar_sim.metrics.limits import look_up
-from fivebar_sim.recording_series import points
+from fivebar_sim.recording.plots import points
 from fivebar_sim.report import draw
 from fivebar_sim.report.draw import Drawn
 from fivebar_sim.report.look import colour

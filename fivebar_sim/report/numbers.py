@@ -13,7 +13,7 @@ from fivebar_sim.files import tables
 from fivebar_sim.metrics.catalogue import GROUND_KEYS, SHOWN
 from fivebar_sim.metrics.limits import Limit, judge
 from fivebar_sim.metrics.tracking import tracking_error
-from fivebar_sim.recording_series import SHARE_WINDOW, load_share
+from fivebar_sim.recording.plots import SHARE_WINDOW, load_share
 from fivebar_sim.stored_run import StoredRun
 
 PERCENTILE = 95.0

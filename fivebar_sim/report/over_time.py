@@ -10,7 +10,7 @@ from fivebar_sim.arrays import Array
 from fivebar_sim.metrics import ground, tracking
 from fivebar_sim.metrics.catalogue import shown
 from fivebar_sim.metrics.limits import look_up
-from fivebar_sim.recording_series import SHARE_WINDOW
+from fivebar_sim.recording.plots import SHARE_WINDOW
 from fivebar_sim.report import draw, numbers
 from fivebar_sim.report.draw import Drawn
 from fivebar_sim.report.look import colour

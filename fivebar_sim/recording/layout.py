@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from fivebar_sim.recording_foot import BACKGROUND, TRAIL
-from fivebar_sim.recording_look import Look
-from fivebar_sim.recording_motion import Stage
-from fivebar_sim.recording_scene import in_space
-from fivebar_sim.recording_series import Series
+from fivebar_sim.recording.foot import BACKGROUND, TRAIL
+from fivebar_sim.recording.leg import in_space
+from fivebar_sim.recording.look import Look
+from fivebar_sim.recording.plots import Series
+from fivebar_sim.recording.poses import Stage
 
 if TYPE_CHECKING:
     import rerun as rr

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from fivebar_sim.geometry import FiveBar
-from fivebar_sim.recording_look import GREY, LIGHT_GREY, YELLOW, Look
-from fivebar_sim.recording_motion import Motion, Stage
-from fivebar_sim.recording_scene import in_space
+from fivebar_sim.recording.leg import in_space
+from fivebar_sim.recording.look import GREY, LIGHT_GREY, YELLOW, Look
+from fivebar_sim.recording.poses import Motion, Stage
 
 if TYPE_CHECKING:
     import rerun as rr

@@ -15,14 +15,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from fivebar_sim import recording, recording_layout, recording_viewer
-from fivebar_sim import recording_foot as foot
-from fivebar_sim import recording_ground as ground
-from fivebar_sim import recording_scene as scene
 from fivebar_sim.errors import ConfigError
-from fivebar_sim.recording_look import Look
-from fivebar_sim.recording_motion import Motion, Stage, motion, stage
-from fivebar_sim.recording_series import Series, series
+from fivebar_sim.recording import foot, ground, layout, rrd
+from fivebar_sim.recording import leg as scene
+from fivebar_sim.recording import viewer as recording_viewer
+from fivebar_sim.recording.look import Look
+from fivebar_sim.recording.plots import Series, series
+from fivebar_sim.recording.poses import Motion, Stage, motion, stage
 from fivebar_sim.scenario.scenes import Ground
 from fivebar_sim.simulation.plan import Plan
 from fivebar_sim.simulation.record import columns
@@ -57,8 +56,8 @@ def streaming(planned: Plan, address: str) -> Iterator[Watch]:
     Raises:
         RerunDisabledError: The environment variable RERUN switches Rerun off.
     """
-    with recording.session():
-        stream = recording.started(planned.scenario.name)
+    with rrd.session():
+        stream = rrd.started(planned.scenario.name)
         stream.connect_grpc(f"rerun+http://{address}/proxy")
         sender, before = _Sender(planned, stream), sys.getswitchinterval()
         sys.setswitchinterval(SWITCH)
@@ -174,7 +173,7 @@ class _Sender:
         self._begin += states.time.shape[1]
         self._last = states.part(slice(-1, None))
 
-    def _show(self, record: recording.Record) -> None:
+    def _show(self, record: rrd.Record) -> None:
         planned, stream, look = self._planned, self._stream, Look()
         leg, h = planned.scenario.leg, planned.motion.timestep
         plots = list(series(planned.scenario, record))
@@ -182,21 +181,21 @@ class _Sender:
             self._begin_recording(plots, look)
         rows = np.arange(0, len(record["time"]), max(1, round(1.0 / (RATE * h))))
         moved = motion(record, rows)
-        at = recording.times(record["time"][rows], self._begin + rows + 1)
+        at = rrd.times(record["time"][rows], self._begin + rows + 1)
         scene.send_leg(stream, leg, moved, look, at)
         foot.send_foot(stream, leg, moved, look, at)
         ground.send_ground(stream, leg, moved, look, at, self._room)
         for plot in plots:
             shown = plot.shown[rows]
             values = plot.values[(np.cumsum(plot.shown) - 1)[rows[shown]]]
-            recording.send_series(stream, plot._replace(values=values, shown=shown), look, at)
+            rrd.send_series(stream, plot._replace(values=values, shown=shown), look, at)
 
     def _begin_recording(self, plots: list[Series], look: Look) -> None:
         planned, stream = self._planned, self._stream
-        recording_layout.send(stream, recording_layout.contents(self._room, [look], [plots]))
-        recording.log_room(stream, self._room)
+        layout.send(stream, layout.contents(self._room, [look], [plots]))
+        rrd.log_room(stream, self._room)
         text = f"# {planned.scenario.name}\n\nNo verdict yet: shown while it is simulated."
-        stream.log(recording_layout.SUMMARY, _markdown(text), static=True)
+        stream.log(layout.SUMMARY, _markdown(text), static=True)
         scene.log_leg(stream, planned.scenario.leg, look)
         foot.log_foot(stream, planned.motion.foot[1:], look)
 

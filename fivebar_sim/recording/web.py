@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 from fivebar_sim.checks import check_number
 from fivebar_sim.errors import ConfigError
-from fivebar_sim.recording_viewer import LOOPBACK, web_files
+from fivebar_sim.recording.viewer import LOOPBACK, web_files
 
 POLICY = "; ".join(
     (

@@ -1,6 +1,6 @@
 """Whether Rerun reads a recording, to its end: a program of its own, since some damage ends it.
 
-Usage: python -m fivebar_sim.recording_check RECORDING. Exit status 0 if it can be read; what Rerun
+Usage: python -m fivebar_sim.recording.check RECORDING. Exit status 0 if it can be read; what Rerun
 and its reader say of the damage is of no use to anybody, and goes where the caller sends it.
 """
 
@@ -19,7 +19,7 @@ def reads(path: Path) -> bool:
 
     In this one a panic of the reader would be the end of everything.
     """
-    command = [sys.executable, "-P", "-m", "fivebar_sim.recording_check", str(path)]
+    command = [sys.executable, "-P", "-m", "fivebar_sim.recording.check", str(path)]
     nowhere = subprocess.DEVNULL
     return subprocess.call(command, stdin=nowhere, stdout=nowhere, stderr=nowhere) == 0
 

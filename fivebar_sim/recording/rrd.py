@@ -16,17 +16,15 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
-from fivebar_sim import recording_foot as foot
-from fivebar_sim import recording_ground as ground
-from fivebar_sim import recording_layout as layout
-from fivebar_sim import recording_scene as scene
 from fivebar_sim.arrays import Array
 from fivebar_sim.errors import FiveBarError
 from fivebar_sim.metrics.columns import Record
-from fivebar_sim.recording_look import Look, looks
-from fivebar_sim.recording_motion import Motion, Rows, Stage, drawn_rows, motion, points, stage
-from fivebar_sim.recording_series import Series, series
-from fivebar_sim.recording_summary import summary
+from fivebar_sim.recording import foot, ground, layout
+from fivebar_sim.recording import leg as scene
+from fivebar_sim.recording.look import Look, looks
+from fivebar_sim.recording.plots import Series, series
+from fivebar_sim.recording.poses import Motion, Rows, Stage, drawn_rows, motion, points, stage
+from fivebar_sim.recording.summary import summary
 
 if TYPE_CHECKING:
     import rerun as rr

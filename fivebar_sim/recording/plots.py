@@ -11,7 +11,7 @@ from fivebar_sim.arrays import Array, Bools
 from fivebar_sim.metrics import ground
 from fivebar_sim.metrics.columns import Record
 from fivebar_sim.metrics.tracking import tracking_error
-from fivebar_sim.recording_look import (
+from fivebar_sim.recording.look import (
     BLUE,
     GREEN,
     GREY,
@@ -21,7 +21,7 @@ from fivebar_sim.recording_look import (
     RED,
     Colour,
 )
-from fivebar_sim.recording_motion import points, timestep
+from fivebar_sim.recording.poses import points, timestep
 
 if TYPE_CHECKING:
     from fivebar_sim.scenario import Scenario

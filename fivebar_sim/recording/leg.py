@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 from fivebar_sim.arrays import Array
 from fivebar_sim.geometry import FiveBar
 from fivebar_sim.kinematics import bases, chain_points
-from fivebar_sim.recording_look import (
+from fivebar_sim.recording.look import (
     BLUE,
     GREY,
     LIGHT_BLUE,
@@ -28,7 +28,7 @@ from fivebar_sim.recording_look import (
     Colour,
     Look,
 )
-from fivebar_sim.recording_motion import Motion, in_height
+from fivebar_sim.recording.poses import Motion, in_height
 
 if TYPE_CHECKING:
     import rerun as rr

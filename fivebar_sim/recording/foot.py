@@ -11,9 +11,9 @@ import numpy as np
 
 from fivebar_sim.arrays import Array
 from fivebar_sim.geometry import FiveBar
-from fivebar_sim.recording_look import GREEN, RED, Colour, Look
-from fivebar_sim.recording_motion import Motion
-from fivebar_sim.recording_scene import HIP, in_space
+from fivebar_sim.recording.leg import HIP, in_space
+from fivebar_sim.recording.look import GREEN, RED, Colour, Look
+from fivebar_sim.recording.poses import Motion
 
 if TYPE_CHECKING:
     import rerun as rr
