@@ -85,10 +85,10 @@ def _clear(folder: Path) -> None:
     """Delete the runs that an earlier failure of a test left; anything else stays."""
     if not folder.is_dir():
         return
-    from fivebar_sim import run_directory
+    from fivebar_sim.runs import directory
 
     for place in folder.iterdir():
-        if run_directory.is_run(place) and not place.is_symlink():
+        if directory.is_run(place) and not place.is_symlink():
             shutil.rmtree(place)
     if not any(folder.iterdir()):
         folder.rmdir()
@@ -112,7 +112,7 @@ def _keep(result: Result, folder: Path, config: pytest.Config) -> str:
 def _draw(result: Result, place: Path) -> list[str]:
     """Write the pictures of the foot's path and of its error; return their names."""
     from fivebar_sim.report import in_plane, look, over_time
-    from fivebar_sim.stored_run import StoredRun
+    from fivebar_sim.runs.stored import StoredRun
 
     run, names = StoredRun(place, result.scenario, result.record, result.metrics), []
     with look.styled():

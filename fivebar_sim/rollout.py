@@ -43,9 +43,9 @@ class Result(NamedTuple):
 
     def write(self, path: str | Path) -> Path:
         """Write the run directory; see `run_directory.write`."""
-        from fivebar_sim import run_directory
+        from fivebar_sim.runs import directory
 
-        return run_directory.write(self, Path(path))
+        return directory.write(self, Path(path))
 
 
 def run(scenario: Scenario) -> Result:

@@ -18,7 +18,8 @@ from hypothesis import HealthCheck, example, given, settings
 from hypothesis.strategies import SearchStrategy
 from shell import Said
 
-from fivebar_sim import cli, run_directory
+from fivebar_sim import cli
+from fivebar_sim.runs import directory
 from fivebar_sim.scenario import scenario
 
 STEPS = 2000
@@ -92,7 +93,7 @@ class Bench:
     @staticmethod
     def clear(place: Path) -> None:
         """Delete a whole run directory."""
-        run_directory.check_run(place)
+        directory.check_run(place)
         for file in place.iterdir():
             file.unlink()
         place.rmdir()

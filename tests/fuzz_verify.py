@@ -10,10 +10,11 @@ from typing import Any, NoReturn
 import numpy as np
 import pyarrow.parquet
 
-from fivebar_sim import rollout, run_directory
+from fivebar_sim import rollout
 from fivebar_sim.arrays import Array
 from fivebar_sim.metrics import look_up
 from fivebar_sim.recording.check import read_through
+from fivebar_sim.runs import directory
 from fivebar_sim.scenario import Scenario
 
 Record = dict[str, Array]
@@ -21,7 +22,7 @@ Record = dict[str, Array]
 
 def check(place: Path) -> str:
     """Return the verdict of a run directory; fail unless it is whole and true."""
-    assert {p.name for p in place.iterdir() if p.suffix != ".csv"} == set(run_directory.FILES)
+    assert {p.name for p in place.iterdir() if p.suffix != ".csv"} == set(directory.FILES)
     scenario = Scenario.load(place / "scenario.toml")
     table = pyarrow.parquet.read_table(place / "rollout.parquet")
     record: Record = {name: table[name].to_numpy() for name in table.column_names}

@@ -9,8 +9,9 @@ from xml.etree import ElementTree
 import pytest
 from shell import ELLIPSE, Shell
 
-from fivebar_sim import rollout, run_directory
+from fivebar_sim import rollout
 from fivebar_sim.files import resources
+from fivebar_sim.runs import directory
 
 BASELINE = Path("baselines/short.json")
 SHIPPED = resources.shipped("scenarios")
@@ -148,12 +149,12 @@ def test_failed_run_is_kept_and_stays(recorded: Shell) -> None:
     said = recorded("check", "short.toml", *fault)
     place = Path("runs/failed/short")
     assert f"note: short: its run is kept in {place}" in said.out
-    run_directory.check_run(place)
+    directory.check_run(place)
     assert "kd = 0.055" in (place / "scenario.toml").read_text("utf-8")
     assert recorded("check", "short.toml").status == 0
-    run_directory.check_run(place)
+    directory.check_run(place)
     assert recorded("check", "short.toml", *fault, "--keep", "mine", "--quiet").status == 1
-    run_directory.check_run(Path("mine/short"))
+    directory.check_run(Path("mine/short"))
 
 
 def test_any_path_can_be_told(recorded: Shell) -> None:
@@ -161,7 +162,7 @@ def test_any_path_can_be_told(recorded: Shell) -> None:
     assert (
         recorded("check", "short.toml", *odd, "--junit", "x.xml", "--summary", "x.md").status == 1
     )
-    run_directory.check_run(Path("\udcff/short"))
+    directory.check_run(Path("\udcff/short"))
     assert "\\udcff" in Path("x.md").read_text("utf-8")
     ElementTree.parse("x.xml")
 

@@ -11,7 +11,7 @@ import pytest
 from shell import CSV, ELLIPSE, Shell
 
 from fivebar_sim.recording import rrd
-from fivebar_sim.run_directory import FILES
+from fivebar_sim.runs.directory import FILES
 
 FROM_CSV = ["--set", "path.kind=csv", "--set", "path.file=foot.csv"]
 DIVERGING = ["--set", "sim.integrator=implicitfast", "--set", "sim.timestep=0.02"]

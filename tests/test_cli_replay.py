@@ -15,7 +15,7 @@ from pathlib import Path
 import pytest
 from shell import Shell, started
 
-from fivebar_sim import recording_file
+from fivebar_sim.runs import recording_file
 
 PROGRAM = "import sys; from fivebar_sim.cli import main; sys.exit(main())"
 

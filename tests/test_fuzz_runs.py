@@ -20,7 +20,7 @@ from shell import ELLIPSE
 from fivebar_sim import rollout
 from fivebar_sim.recording import check
 from fivebar_sim.recording.check import read_through
-from fivebar_sim.recording_file import RECORDING
+from fivebar_sim.runs.recording_file import RECORDING
 from fivebar_sim.scenario import Scenario
 
 

@@ -10,8 +10,8 @@ import pytest
 from fuzz import Bench, Law
 from shell import ELLIPSE
 
-from fivebar_sim import recording_file
 from fivebar_sim.files import resources
+from fivebar_sim.runs import recording_file
 
 CORPUS = Path(__file__).with_name("corpus")
 EXPECTED: dict[str, str] = tomllib.loads((CORPUS / "expected.toml").read_text("utf-8"))

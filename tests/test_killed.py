@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from fivebar_sim import run_directory, stored_run
+from fivebar_sim.runs import directory, stored
 
 WRITER = Path(__file__).with_name("writer.py")
 pytestmark = pytest.mark.skipif(not hasattr(os, "fork"), reason="this system cannot fork")
@@ -58,10 +58,10 @@ def check(writer: Writer) -> str:
     """Return what is left, "nothing" or "run"; a run must be whole."""
     if not writer.place.exists():
         return "nothing"
-    run = stored_run.read(writer.place)
+    run = stored.read(writer.place)
     assert run.scenario.duration in (1.0, 1.2)
     assert len(run.record["time"]) == run.scenario.steps
-    assert run_directory.is_run(writer.place)
+    assert directory.is_run(writer.place)
     assert (writer.place / "recording.rrd").read_bytes()[:4] == b"RRF2"
     return "run"
 

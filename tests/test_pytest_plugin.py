@@ -15,7 +15,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from shell import ELLIPSE
 
-from fivebar_sim import pytest_plugin, stored_run
+from fivebar_sim import pytest_plugin
+from fivebar_sim.runs import stored
 
 ROOT = Path(__file__).resolve().parents[1]
 LIMITS = '[limits]\ntracking.rms = 1e-6\n"load.share_A" = [0.4, 0.6]\nclosure.max = 1e-9\n'
@@ -155,7 +156,7 @@ def test_range(leg_run):
         assert {file.name for file in place.iterdir()} == KEPT
         assert f"kept in {place.relative_to(tmp_path)} (recording.rrd" in said
         assert (place / "tracking-error.png").read_bytes().startswith(b"\x89PNG")
-        stored_run.read(place)
+        stored.read(place)
 
     (folder / "mine.txt").touch()
     session(source.replace("low=0.9", "low=0.1"), "-k", "range", passed=1)

@@ -11,8 +11,9 @@ from pathlib import Path
 import pytest
 from recorded import digest
 
-from fivebar_sim import recording_file, rollout
+from fivebar_sim import rollout
 from fivebar_sim.errors import ConfigError, RunDirectoryError
+from fivebar_sim.runs import recording_file
 from fivebar_sim.scenario import Scenario
 
 

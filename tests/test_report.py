@@ -13,13 +13,14 @@ import pytest
 from reports import Page
 from shell import Shell
 
-from fivebar_sim import report, rollout, run_directory, stored_run
+from fivebar_sim import report, rollout
 from fivebar_sim.errors import ArgumentError, RunDirectoryError
 from fivebar_sim.files import tables
 from fivebar_sim.metrics import judge, look_up
 from fivebar_sim.metrics.catalogue import SHOWN, shown
 from fivebar_sim.metrics.limits import bounds
 from fivebar_sim.report import comparison, look, single
+from fivebar_sim.runs import directory, stored
 from fivebar_sim.scenario import Scenario
 
 AIR = ["foot-path", "leg-moments", "tracking-error", "load-share", "torque", "loop-gap"]
@@ -62,7 +63,7 @@ def test_a_page_is_whole_and_says_its_verdict(
     runs: dict[str, Path], pages: dict[str, Page]
 ) -> None:
     for name, path in runs.items():
-        run, page = stored_run.read(path), pages[name]
+        run, page = stored.read(path), pages[name]
         assert page.all("html")[0].attributes["lang"] == "en"
         assert page.all("title")[0].text == [f"{run.scenario.name}: {run.metrics['verdict']}"]
         (word,) = (e for e in page.all("span") if "verdict" in e.attributes.get("class", ""))
@@ -89,7 +90,7 @@ def test_every_limit_is_there_with_value_and_verdict(
 ) -> None:
     seen = set()
     for name, path in runs.items():
-        run, rows = stored_run.read(path), pages[name].rows()
+        run, rows = stored.read(path), pages[name].rows()
         for limit in judge(run.metrics, run.scenario.limits):
             word = "pass" if limit.ok else "FAIL"
             seen.add(word)
@@ -121,7 +122,7 @@ def test_what_was_run_can_be_run_again(runs: dict[str, Path], pages: dict[str, P
         command, scenario = ("".join(pre.text) for pre in pages[name].all("pre"))
         assert scenario == (path / "scenario.toml").read_text(encoding="utf-8")
         assert shlex.split(command) == ["fivebar", "run", f"{name}/scenario.toml"]
-        provenance = stored_run.read(path).metrics["provenance"]
+        provenance = stored.read(path).metrics["provenance"]
         assert ["mujoco", provenance["mujoco"]] in pages[name].rows()
 
 
@@ -150,7 +151,7 @@ def test_comparison_tells_runs_apart(runs: dict[str, Path], pages: dict[str, Pag
     assert rows[1] == ["verdict", "FAIL", "FAIL", "pass"]
     for svg in page.all("svg"):
         assert set(runs) <= {text.strip() for text in svg.text}
-    read = [stored_run.read(path) for path in runs.values()]
+    read = [stored.read(path) for path in runs.values()]
     for key, (label, _, _) in SHOWN.items():
         (row,) = (row for row in rows if row[0] == label)
         for cell, run in zip(row[1:], read, strict=True):
@@ -188,9 +189,9 @@ def test_same_runs_same_bytes(
 def test_a_run_directory_with_its_report_stays_one(runs: dict[str, Path], tmp_path: Path) -> None:
     run = shutil.copytree(runs["limited"], tmp_path / "run")
     assert (run / "report.html").is_file()
-    assert run_directory.is_run(run)
-    run_directory.check_place(run)
-    rollout.run(stored_run.read(run).scenario).write(run)
+    assert directory.is_run(run)
+    directory.check_place(run)
+    rollout.run(stored.read(run).scenario).write(run)
     assert not (run / "report.html").exists()
 
 

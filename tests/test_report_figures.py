@@ -11,8 +11,8 @@ from msgspec.structs import replace
 
 from fivebar_sim import metrics, rollout
 from fivebar_sim.report import comparison, in_plane, look, numbers, over_time
+from fivebar_sim.runs.stored import StoredRun
 from fivebar_sim.scenario import Scenario
-from fivebar_sim.stored_run import StoredRun
 
 
 def stored(name: str, *settings: str) -> StoredRun:

@@ -14,9 +14,10 @@ import pytest
 import rerun
 from shell import Shell
 
-from fivebar_sim import memory, recording_file, rollout, run_directory
+from fivebar_sim import memory, rollout
 from fivebar_sim.commands import status
 from fivebar_sim.files import input_file
+from fivebar_sim.runs import directory, recording_file
 from fivebar_sim.scenario import scenario
 
 resource = pytest.importorskip("resource", reason="this system limits no process")
@@ -71,7 +72,7 @@ def test_as_much_memory_as_is_asked_for_is_enough(shell: Shell) -> None:
         run = ["run", "short.toml", "--quiet", "--set", f"duration={steps / 1000}", "--out", "mine"]
         done = limited(shell.folder, resource.RLIMIT_AS, most, *run)
         assert (done.returncode, done.stderr) == (0, "")
-        run_directory.check_run(shell.folder / "mine")
+        directory.check_run(shell.folder / "mine")
 
 
 def test_memory_that_runs_out_is_one_line(shell: Shell, monkeypatch: pytest.MonkeyPatch) -> None:

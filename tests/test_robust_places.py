@@ -13,9 +13,10 @@ from pathlib import Path
 import pytest
 from shell import Shell
 
-from fivebar_sim import rollout, run_directory, stored_run
+from fivebar_sim import rollout
 from fivebar_sim.files import leftovers
 from fivebar_sim.rollout import Result
+from fivebar_sim.runs import directory, stored
 from fivebar_sim.scenario import Scenario
 
 fcntl = pytest.importorskip("fcntl", reason="this system has no locks on directories")
@@ -38,8 +39,8 @@ def test_two_runs_at_once_leave_one_whole_run(shell: Shell) -> None:
     said = [process.communicate()[1] for process in started]
     assert said == [b"", b""]
     assert [process.returncode for process in started] == [0, 0]
-    assert shell.names() == before | {"mine", *(f"mine/{name}" for name in run_directory.FILES)}
-    assert len(stored_run.read(Path("mine")).record["time"]) == 600
+    assert shell.names() == before | {"mine", *(f"mine/{name}" for name in directory.FILES)}
+    assert len(stored.read(Path("mine")).record["time"]) == 600
 
 
 def test_many_writers_of_one_place_all_end_well(tmp_path: Path, results: list[Result]) -> None:
@@ -59,7 +60,7 @@ def test_many_writers_of_one_place_all_end_well(tmp_path: Path, results: list[Re
         thread.join()
     assert errors == []
     assert os.listdir(tmp_path) == ["mine"]
-    run = stored_run.read(place)
+    run = stored.read(place)
     assert len(run.record["time"]) == run.scenario.steps
 
 
@@ -82,7 +83,7 @@ def test_a_place_taken_in_between_is_exchanged_anew(
     monkeypatch.setattr(Path, "rename", late)
     results[1].write(place)
     assert len(overtaken) == 2
-    assert stored_run.read(place).scenario.duration == 0.9
+    assert stored.read(place).scenario.duration == 0.9
     assert os.listdir(tmp_path) == ["mine"]
 
 
@@ -98,7 +99,7 @@ def test_what_always_fails_is_not_tried_for_ever(
     monkeypatch.setattr(Path, "rename", never)
     with pytest.raises(OSError, match=r"cannot write .*: No such file or directory$"):
         results[0].write(tmp_path / "mine")
-    assert len(tried) == run_directory.ATTEMPTS
+    assert len(tried) == directory.ATTEMPTS
     assert os.listdir(tmp_path) == []
 
 

@@ -14,11 +14,12 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
-from fivebar_sim import rollout, run_directory
+from fivebar_sim import rollout
 from fivebar_sim.errors import RunDirectoryError
 from fivebar_sim.recording import rrd
 from fivebar_sim.rollout import Result
-from fivebar_sim.run_directory import FILES
+from fivebar_sim.runs import directory
+from fivebar_sim.runs.directory import FILES
 from fivebar_sim.scenario import Scenario
 
 COLUMNS = (
@@ -61,8 +62,8 @@ def test_run_directory_is_complete_and_alone(tmp_path: Path, result: Result) -> 
     assert where == tmp_path / "runs" / "deep" / "mine"
     assert names(where) == set(FILES)
     assert names(where.parent) == {"mine"}
-    assert run_directory.is_run(where)
-    run_directory.check_run(where)
+    assert directory.is_run(where)
+    directory.check_run(where)
     assert all((where / name).stat().st_size > 0 for name in FILES)
 
 
@@ -140,7 +141,7 @@ def test_relative_and_odd_names_are_taken_literally(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     for name in ("plain", "~", "~/mine", "s3:/bucket", "two words", "é"):
-        run_directory.check_run(result.write(name))
+        directory.check_run(result.write(name))
     assert names(tmp_path) == {"plain", "~", "s3:", "two words", "é"}
 
 
@@ -231,9 +232,9 @@ def test_interrupt_between_the_renames_brings_the_old_run_back(
 def test_incomplete_run_is_none(tmp_path: Path, result: Result, missing: str) -> None:
     where = result.write(tmp_path / "mine")
     (where / missing).unlink()
-    assert not run_directory.is_run(where)
+    assert not directory.is_run(where)
     with pytest.raises(RunDirectoryError) as caught:
-        run_directory.check_run(where)
+        directory.check_run(where)
     assert str(caught.value) == f"{where} is no run directory: it lacks {missing}"
     with pytest.raises(RunDirectoryError, match=r"no such directory$"):
-        run_directory.check_run(tmp_path / "nowhere")
+        directory.check_run(tmp_path / "nowhere")

@@ -16,8 +16,9 @@ from pathlib import Path
 import pytest
 from shell import ELLIPSE, Shell, started
 
-from fivebar_sim import cli, signals, stored_run
+from fivebar_sim import cli, signals
 from fivebar_sim.errors import ConfigError
+from fivebar_sim.runs import stored
 
 pytestmark = pytest.mark.skipif(os.name == "nt", reason="Windows sends no signals to one process")
 
@@ -177,7 +178,7 @@ def test_signal_at_any_moment_ends_the_program(
             process.send_signal(sent)
             err = process.communicate()[1]
         if place.exists():
-            stored_run.read(place)
+            stored.read(place)
         came[process.returncode, err, place.exists()] += 1
     assert not list(tmp_path.glob(".*"))
     # a whole run is there if it had ended: nothing to end, or nothing but the interpreter

@@ -10,8 +10,9 @@ from typing import Any, NamedTuple
 import pytest
 from shell import Shell
 
-from fivebar_sim import rollout, stored_metrics
+from fivebar_sim import rollout
 from fivebar_sim.errors import RunDirectoryError
+from fivebar_sim.runs import stored_metrics
 from fivebar_sim.scenario import Scenario, scenes
 
 

@@ -12,9 +12,10 @@ import pyarrow
 import pyarrow.parquet
 import pytest
 
-from fivebar_sim import rollout, stored_run
+from fivebar_sim import rollout
 from fivebar_sim.errors import RunDirectoryError
 from fivebar_sim.rollout import Result
+from fivebar_sim.runs import stored
 from fivebar_sim.scenario import Scenario
 
 
@@ -29,7 +30,7 @@ def written(result: Result, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_what_was_written_comes_back(result: Result, written: Path) -> None:
-    run = stored_run.read(written)
+    run = stored.read(written)
     assert run.scenario.table() == result.scenario.table()
     assert run.metrics == json.loads(json.dumps(result.metrics))
     assert list(run.record) == list(result.record)
@@ -103,10 +104,10 @@ def test_damage_is_named(
 ) -> None:
     run = tmp_path / "run"
     shutil.copytree(written, run)
-    stored_run.read(run)
+    stored.read(run)
     damage(run)
     with pytest.raises(RunDirectoryError) as caught:
-        stored_run.read(run)
+        stored.read(run)
     message = str(caught.value)
     assert said in message
     assert str(run) in message

@@ -35,10 +35,10 @@ def render(
         height: Of the picture [pixels].
         at: Moment of a .png [s] (default: the middle of the run).
     """
-    from fivebar_sim import stored_run
     from fivebar_sim.render import gl
+    from fivebar_sim.runs import stored
 
-    run = stored_run.read(run_dir)
+    run = stored.read(run_dir)
     gl.find()  # before mujoco is imported, which fails where MUJOCO_GL names what is not there
 
     from fivebar_sim.render import film as render

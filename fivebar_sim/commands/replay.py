@@ -35,8 +35,8 @@ def _show(run_dirs: tuple[Path, ...]) -> int:
     """Show the recording in the native viewer, until it is closed."""
     import subprocess
 
-    from fivebar_sim import recording_file
     from fivebar_sim.recording import viewer
+    from fivebar_sim.runs import recording_file
 
     with recording_file.opened(run_dirs) as file:
         command = viewer.native(file)
@@ -47,8 +47,9 @@ def _show(run_dirs: tuple[Path, ...]) -> int:
 
 def _serve(run_dirs: tuple[Path, ...], port: int) -> int:
     """Serve the recording to browsers, until Ctrl-C, which is the way to end it: status 0."""
-    from fivebar_sim import recording_file, signals
+    from fivebar_sim import signals
     from fivebar_sim.recording import web
+    from fivebar_sim.runs import recording_file
 
     title = " + ".join(recording_file.called(run_dirs))
     try:

@@ -41,12 +41,12 @@ def run(
         quiet: Print nothing but errors.
         json: Print the metrics as JSON instead of tables.
     """
-    from fivebar_sim import run_directory
+    from fivebar_sim.runs import directory
 
     plans = plans_of(scenarios, settings)
     places = _places(plans, out)
     for place in places:
-        run_directory.check_place(place)
+        directory.check_place(place)
     viewer = _viewer(live_at) if live or live_at is not None else None
     return _run(plans, places, viewer, quiet=quiet, as_json=json)
 

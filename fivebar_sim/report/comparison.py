@@ -18,7 +18,7 @@ from fivebar_sim.report import draw, html, numbers
 from fivebar_sim.report.draw import Drawn
 from fivebar_sim.report.html import Cell, plain, text
 from fivebar_sim.report.look import colour
-from fivebar_sim.stored_run import StoredRun
+from fivebar_sim.runs.stored import StoredRun
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from fivebar_sim.arrays import Array, Bools
 from fivebar_sim.report.look import TIME, WIDTH, colour
-from fivebar_sim.stored_run import StoredRun
+from fivebar_sim.runs.stored import StoredRun
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -16,7 +16,7 @@ from fivebar_sim.recording.plots import points
 from fivebar_sim.report import draw
 from fivebar_sim.report.draw import Drawn
 from fivebar_sim.report.look import colour
-from fivebar_sim.stored_run import StoredRun
+from fivebar_sim.runs.stored import StoredRun
 from fivebar_sim.workspace.survey import survey
 
 if TYPE_CHECKING:

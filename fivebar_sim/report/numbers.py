@@ -14,7 +14,7 @@ from fivebar_sim.metrics.catalogue import GROUND_KEYS, SHOWN
 from fivebar_sim.metrics.limits import Limit, judge
 from fivebar_sim.metrics.tracking import tracking_error
 from fivebar_sim.recording.plots import SHARE_WINDOW, load_share
-from fivebar_sim.stored_run import StoredRun
+from fivebar_sim.runs.stored import StoredRun
 
 PERCENTILE = 95.0
 """Of the tracking error, beside its RMS."""

@@ -14,7 +14,7 @@ from fivebar_sim.recording.plots import SHARE_WINDOW
 from fivebar_sim.report import draw, numbers
 from fivebar_sim.report.draw import Drawn
 from fivebar_sim.report.look import colour
-from fivebar_sim.stored_run import StoredRun
+from fivebar_sim.runs.stored import StoredRun
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

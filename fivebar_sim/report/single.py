@@ -14,7 +14,7 @@ from fivebar_sim.metrics.limits import bounds, look_up
 from fivebar_sim.report import html, in_plane, numbers, over_time
 from fivebar_sim.report.draw import Drawn
 from fivebar_sim.report.html import plain, text
-from fivebar_sim.stored_run import StoredRun
+from fivebar_sim.runs.stored import StoredRun
 
 
 def figures(run: StoredRun) -> list[Drawn]:

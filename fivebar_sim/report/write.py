@@ -6,10 +6,10 @@ import os
 from collections.abc import Sequence
 from pathlib import Path
 
-from fivebar_sim import stored_run
 from fivebar_sim.errors import ArgumentError, RunDirectoryError
 from fivebar_sim.files import whole_file
 from fivebar_sim.report import comparison, look, single
+from fivebar_sim.runs import stored
 
 
 def place_of(runs: Sequence[Path]) -> Path:
@@ -39,7 +39,7 @@ def write(runs: Sequence[Path], out: Path | None = None, png: Path | None = None
         raise RunDirectoryError(f"cannot write {place}: a report must end in .html")
     if place.is_dir():
         raise RunDirectoryError(f"cannot write {place}: a directory is there")
-    read = [stored_run.read(path) for path in runs]
+    read = [stored.read(path) for path in runs]
     files: dict[Path, bytes] = {}
     with look.styled():
         drawn = single.figures(read[0]) if len(read) == 1 else comparison.figures(read)

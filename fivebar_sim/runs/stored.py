@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from fivebar_sim import run_directory, stored_metrics
+from fivebar_sim.runs import directory, stored_metrics
 from fivebar_sim.errors import FiveBarError, RunDirectoryError
 from fivebar_sim.metrics import load
 from fivebar_sim.metrics.columns import JOINT_COLUMNS, Record
@@ -57,7 +57,7 @@ def read(path: Path) -> StoredRun:
             the file.
     """
     if not all((path / name).is_file() for name in SOURCES):
-        run_directory.check_run(path)
+        directory.check_run(path)
     try:
         scenario = Scenario.load(path / "scenario.toml")
     except FiveBarError as error:

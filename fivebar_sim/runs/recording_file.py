@@ -9,7 +9,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
-from fivebar_sim import stored_run
+from fivebar_sim.runs import stored
 from fivebar_sim.errors import ConfigError
 from fivebar_sim.recording import check, rrd
 
@@ -32,7 +32,7 @@ def opened(paths: Sequence[Path]) -> Iterator[Path]:
         OSError: No temporary file can be written.
     """
     labels = called(paths)
-    runs = [stored_run.read(path) for path in paths]
+    runs = [stored.read(path) for path in paths]
     with tempfile.TemporaryDirectory(prefix="fivebar-") as folder:
         if len(runs) == 1:
             yield _own(runs[0], Path(folder))
@@ -56,7 +56,7 @@ def called(paths: Sequence[Path]) -> list[str]:
     return names if len(set(names)) == len(names) else [str(place) for place in places]
 
 
-def _own(run: stored_run.StoredRun, folder: Path) -> Path:
+def _own(run: stored.StoredRun, folder: Path) -> Path:
     """Return a recording of one run that can be read: its own, or one in the folder."""
     own = run.path / RECORDING
     if readable(own):
