@@ -16,13 +16,13 @@ import numpy as np
 from fivebar_sim import tasks
 from fivebar_sim.arrays import Array
 from fivebar_sim.checks import is_finite
-from fivebar_sim.episodes import Episodes, Outcome
 from fivebar_sim.errors import ArgumentError
 from fivebar_sim.geometry import FiveBar
-from fivebar_sim.leg_group import prepared
 from fivebar_sim.model import quiet
 from fivebar_sim.render import gl
 from fivebar_sim.tasks import REASONS, Randomise, Task
+from fivebar_sim.tasks.episodes import Episodes, Outcome
+from fivebar_sim.tasks.legs import prepared
 
 gl.settle()  # before dm_control loads OpenGL
 

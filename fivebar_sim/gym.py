@@ -13,11 +13,11 @@ from gymnasium.spaces import Box, Space
 
 from fivebar_sim import tasks
 from fivebar_sim.arrays import Array
-from fivebar_sim.episodes import Episodes, Outcome
 from fivebar_sim.errors import ArgumentError, unknown
-from fivebar_sim.leg_group import LegGroup
 from fivebar_sim.render.leg_picture import LegPicture
 from fivebar_sim.tasks import REASONS, Randomise, Task
+from fivebar_sim.tasks.episodes import Episodes, Outcome
+from fivebar_sim.tasks.legs import LegGroup
 
 RENDER_MODES = ("rgb_array",)
 

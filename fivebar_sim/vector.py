@@ -15,8 +15,8 @@ from fivebar_sim.arrays import Array, Bools
 from fivebar_sim.checks import is_finite
 from fivebar_sim.errors import ArgumentError
 from fivebar_sim.gym import layout, spaces
-from fivebar_sim.leg_group import LegGroup
 from fivebar_sim.tasks import REASONS, Randomise, Task
+from fivebar_sim.tasks.legs import LegGroup
 
 
 class LegVectorEnv(VectorEnv[Array, Array, Any]):

@@ -20,9 +20,10 @@ from itertools import cycle
 import numpy as np
 from mujoco.batch import Batch
 
-from fivebar_sim import leg_group, tasks
+from fivebar_sim import tasks
 from fivebar_sim.arrays import Array
 from fivebar_sim.gym import LegEnv
+from fivebar_sim.tasks import legs as leg_group
 from fivebar_sim.vector import LegVectorEnv
 
 with warnings.catch_warnings():  # glfw's, where there is no screen

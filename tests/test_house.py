@@ -47,7 +47,7 @@ PURE = (
     "control.servo",
     "control.step",
     "tasks",
-    "episodes",
+    "tasks.episodes",
     "control.stacked",
 )
 HEAVY = {"mujoco", "rerun", "matplotlib", "scipy"}

@@ -13,11 +13,11 @@ from fivebar_sim import FiveBar, dynamics, kinematics, tasks
 from fivebar_sim.control import Observation
 from fivebar_sim.control.servo import Servo
 from fivebar_sim.control.stacked import stacked
-from fivebar_sim.episodes import Episodes, part_at
 from fivebar_sim.errors import ArgumentError, ConfigError, UnreachableError
-from fivebar_sim.leg_group import LegGroup, starts
 from fivebar_sim.paths import Circle, Line
 from fivebar_sim.tasks import KINDS, REASONS, Randomise, Task
+from fivebar_sim.tasks.episodes import Episodes, part_at
+from fivebar_sim.tasks.legs import LegGroup, starts
 from fivebar_sim.tasks.motion import Motion, motion
 
 LEG = FiveBar.load("extended")  # unequal links, L6 > 0, a tilted base

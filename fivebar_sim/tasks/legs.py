@@ -10,12 +10,12 @@ from numpy.typing import NDArray
 
 from fivebar_sim import model, motion
 from fivebar_sim.arrays import Array
-from fivebar_sim.episodes import Episodes, Outcome
 from fivebar_sim.errors import ArgumentError, UnreachableError
 from fivebar_sim.paths import Step
 from fivebar_sim.scenario.scenes import Ground
 from fivebar_sim.simulation.steps import Legs
 from fivebar_sim.tasks import Randomise, Task
+from fivebar_sim.tasks.episodes import Episodes, Outcome
 
 STARTS = 32
 """Start poses of a leg; an episode draws one."""
