@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fivebar_sim import workspace_map
 from fivebar_sim.cli import main
 from fivebar_sim.errors import ConfigError
 from fivebar_sim.geometry import FiveBar
+from fivebar_sim.report import workspace_map
 
 
 def test_area_of_a_ring() -> None:

@@ -22,8 +22,8 @@ def workspace(
         out: The picture, .png, .svg or .pdf (default workspace-LEG.png).
         path: A scenario whose foot path is drawn on it.
     """
-    from fivebar_sim import workspace_map
     from fivebar_sim.geometry import FiveBar
+    from fivebar_sim.report import workspace_map
     from fivebar_sim.scenario import Scenario
 
     drawn = FiveBar.load(leg)
