@@ -16,7 +16,7 @@ from fivebar_sim.metrics.catalogue import DETAILS, SHOWN, shown
 from fivebar_sim.metrics.limits import bounds, look_up
 
 if TYPE_CHECKING:
-    from fivebar_sim.regression import Checked, Row
+    from fivebar_sim.regression.comparison import Checked, Row
     from fivebar_sim.rollout import Result
 
 WIDEST = 300

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 if TYPE_CHECKING:
-    from fivebar_sim.leg_run import LegRunner
+    from fivebar_sim.regression.leg_run import LegRunner
     from fivebar_sim.rollout import Result
 
 RUNS: pytest.StashKey[list[Result]] = pytest.StashKey()
@@ -45,7 +45,7 @@ def leg_run(request: pytest.FixtureRequest) -> LegRunner:
 
     What a failed test ran is kept under --fivebar-artifacts, with pictures of its foot tracking.
     """
-    from fivebar_sim.leg_run import LegRunner
+    from fivebar_sim.regression.leg_run import LegRunner
 
     _clear(_folder(request.node))
     return LegRunner(request.path.parent, request.node.stash.setdefault(RUNS, []))

@@ -75,9 +75,10 @@ def _read(model: Any, data: Any, item: Any) -> np.ndarray:
 
 def measure() -> dict[str, Any]:
     """Return the metrics of all shipped scenarios with their tolerances, and their bits."""
-    from fivebar_sim import baseline, rollout
+    from fivebar_sim import rollout
     from fivebar_sim.files import resources
     from fivebar_sim.metrics import look_up
+    from fivebar_sim.regression import baseline
     from fivebar_sim.scenario import Scenario
 
     plans = [rollout.plan(Scenario.load(name)) for name in resources.shipped("scenarios")]

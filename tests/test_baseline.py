@@ -8,11 +8,12 @@ from typing import Any
 
 import pytest
 
-from fivebar_sim import baseline, rollout
+from fivebar_sim import rollout
 from fivebar_sim.errors import ConfigError
 from fivebar_sim.files import resources
 from fivebar_sim.metrics import LIMIT_KEYS
 from fivebar_sim.metrics.catalogue import ABSOLUTE
+from fivebar_sim.regression import baseline
 from fivebar_sim.scenario import Scenario
 
 SHIPPED = sorted(resources.shipped("scenarios"))

@@ -9,10 +9,10 @@ from xml.etree import ElementTree
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from fivebar_sim.baseline import Recorded
-from fivebar_sim.check_report import NO_XML, junit, markdown
 from fivebar_sim.metrics import Limit
-from fivebar_sim.regression import BETTER, FAIL, NEW, PASS, Checked, Row
+from fivebar_sim.regression.baseline import Recorded
+from fivebar_sim.regression.ci_files import NO_XML, junit, markdown
+from fivebar_sim.regression.comparison import BETTER, FAIL, NEW, PASS, Checked, Row
 
 RECORDED = Recorded(1e-3, 1e-9, 0.005)
 LIMIT = Limit("tracking.rms", 0.0, 1.3e-3, 1.1e-3, True)

@@ -20,11 +20,12 @@ from faults import MODEL, Fault
 from faults_program import PROGRAM
 from shell import Shell
 
-from fivebar_sim import baseline, regression, rollout
+from fivebar_sim import rollout
 from fivebar_sim.arrays import Array
 from fivebar_sim.errors import FiveBarError
 from fivebar_sim.files import resources
 from fivebar_sim.metrics import look_up
+from fivebar_sim.regression import baseline, comparison
 from fivebar_sim.rollout import Result
 from fivebar_sim.scenario import Scenario
 from fivebar_sim.simulation.steps import Legs
@@ -67,7 +68,7 @@ def notices(name: str) -> bool:
         result = rollout.run(Scenario.load(name))
     except FiveBarError:
         return True
-    return bool(regression.compare(result, baseline.read(baseline.place(name))).failures)
+    return bool(comparison.compare(result, baseline.read(baseline.place(name))).failures)
 
 
 def table(seen: dict[str, set[str]]) -> Iterator[str]:

@@ -8,9 +8,10 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from fivebar_sim import baseline, metrics, regression
-from fivebar_sim.baseline import RELATIVE, Baseline, Recorded
+from fivebar_sim import metrics
 from fivebar_sim.metrics.catalogue import ABSOLUTE, LESS_IS_BETTER, SHOWN
+from fivebar_sim.regression import baseline, comparison
+from fivebar_sim.regression.baseline import RELATIVE, Baseline, Recorded
 from fivebar_sim.rollout import Result
 from fivebar_sim.scenario import Scenario
 
@@ -47,9 +48,9 @@ def recorded(values: dict[str, float | None], relative: float = RELATIVE) -> Bas
 
 
 def verdict(key: str, then: float | None, now: float | None) -> str:
-    checked = regression.compare(result({key: now}), recorded({key: then}))
+    checked = comparison.compare(result({key: now}), recorded({key: then}))
     assert [row.key for row in checked.rows] == [key]
-    assert bool(checked.failures) == (checked.rows[0].verdict == regression.FAIL)
+    assert bool(checked.failures) == (checked.rows[0].verdict == comparison.FAIL)
     return checked.rows[0].verdict
 
 
@@ -94,14 +95,14 @@ def test_what_is_undefined_on_one_side_fails() -> None:
     assert verdict("load.share_A", None, None) == "pass"
     assert verdict("load.share_A", 0.5, None) == "FAIL"
     assert verdict("load.share_A", None, 0.5) == "FAIL"
-    gone = regression.compare(result({}), recorded({"ground.slip": 1e-3}))  # it was a rail, once
+    gone = comparison.compare(result({}), recorded({"ground.slip": 1e-3}))  # it was a rail, once
     assert gone.failures == ["slip in stance: undefined, baseline 1 mm"]
 
 
 def test_limits_count_beside_baselines() -> None:
     values: dict[str, float | None] = {"tracking.rms": 1e-3, "closure.max": 1e-7}
     limits = {"tracking.rms": (-float("inf"), 0.9e-3), "warnings": (-float("inf"), 0.0)}
-    checked = regression.compare(result({**values, "warnings": 0}, limits), recorded(values))
+    checked = comparison.compare(result({**values, "warnings": 0}, limits), recorded(values))
     assert [(row.key, row.verdict) for row in checked.rows] == [
         ("tracking.rms", "FAIL"),  # as good as ever, and that is not good enough
         ("closure.max", "pass"),
@@ -112,7 +113,7 @@ def test_limits_count_beside_baselines() -> None:
 
 def test_rows_come_in_the_order_of_every_table() -> None:
     values: dict[str, float | None] = dict.fromkeys(reversed(KEYS), 1.0)
-    rows = regression.compare(result(values), recorded(values)).rows
+    rows = comparison.compare(result(values), recorded(values)).rows
     assert [row.key for row in rows] == [key for key in SHOWN if key in ABSOLUTE]
 
 
@@ -123,7 +124,7 @@ def test_tripped_guards_are_failures() -> None:
         {"name": "loop", "value": 1e-3, "high": 2e-3, "time": None, "ok": True},
         {"name": "torque", "value": 0.7, "high": 0.5, "time": 0.6, "ok": False},
     ]
-    checked = regression.compare(
+    checked = comparison.compare(
         good._replace(metrics=good.metrics | {"verdict": "fail", "guards": passed}), None
     )
     assert checked.failures == [
@@ -135,13 +136,13 @@ def test_tripped_guards_are_failures() -> None:
 def test_failures_say_how_far_and_remarks_what_else() -> None:
     then = recorded({"tracking.rms": 1e-3, "closure.max": 2e-6})
     here = result({"tracking.rms": 1.1e-3, "closure.max": 1e-6})
-    checked = regression.compare(here, then)
+    checked = comparison.compare(here, then)
     assert checked.failures == ["tracking RMS: 1.1 mm, baseline 1 mm (+10.0 %; 5.001 um allowed)"]
     assert checked.remarks == ["better than its baseline: loop gap max; --update records it"]
     here.metrics["provenance"] = PROVENANCE | {"mujoco": "3.18.0"}
     note = "its baseline was made with mujoco 3.17.0, now 3.18.0"
-    assert regression.compare(here, then).notes == [note]
-    assert "no baseline" in regression.compare(here, None).notes[0]
+    assert comparison.compare(here, then).notes == [note]
+    assert "no baseline" in comparison.compare(here, None).notes[0]
 
 
 @pytest.mark.parametrize(
@@ -158,7 +159,7 @@ def test_failures_say_how_far_and_remarks_what_else() -> None:
     ],
 )
 def test_change_is_in_percent(then: float | None, now: float | None, change: str) -> None:
-    rows = regression.compare(
+    rows = comparison.compare(
         result({"load.saturated.A": now}), recorded({"load.saturated.A": then})
     ).rows
     assert rows[0].change == change
@@ -167,6 +168,6 @@ def test_change_is_in_percent(then: float | None, now: float | None, change: str
 def test_accepted_differences_fail_no_more() -> None:
     then = recorded({"tracking.rms": 1e-3, "closure.max": 2e-6, "closure.rms": 1e-6})
     here = result({"tracking.rms": 1.1e-3, "closure.max": 1e-6, "closure.rms": 1e-6})
-    accepted = regression.accept(regression.compare(here, then))
+    accepted = comparison.accept(comparison.compare(here, then))
     assert [row.verdict for row in accepted.rows] == ["new", "pass", "new"]
     assert (accepted.failures, accepted.remarks) == ([], [])

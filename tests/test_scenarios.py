@@ -10,12 +10,13 @@ from pathlib import Path
 import faults_disturbed as disturbed
 import pytest
 
-from fivebar_sim import baseline, control, regression, rollout
+from fivebar_sim import control, rollout
 from fivebar_sim.control.servo import Servo
 from fivebar_sim.errors import FiveBarError
 from fivebar_sim.files import resources
 from fivebar_sim.metrics import Limit
 from fivebar_sim.metrics.guards import Guards
+from fivebar_sim.regression import baseline, comparison
 from fivebar_sim.rollout import Plan, Result
 from fivebar_sim.scenario import Scenario, scenes
 
@@ -74,7 +75,7 @@ def results() -> dict[str, Result]:
 def red(result: Result) -> bool:
     """Return whether a check of a run fails."""
     recorded = baseline.read(baseline.place(result.scenario.name))
-    return bool(regression.compare(result, recorded).failures)
+    return bool(comparison.compare(result, recorded).failures)
 
 
 def turn_red(plans: list[Plan]) -> list[bool]:

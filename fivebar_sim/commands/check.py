@@ -12,8 +12,8 @@ from fivebar_sim.commands.status import FAILED, WRONG, say
 from fivebar_sim.errors import ConfigError, DivergedError, RunDirectoryError
 
 if TYPE_CHECKING:
-    from fivebar_sim.baseline import Baseline
-    from fivebar_sim.regression import Checked
+    from fivebar_sim.regression.baseline import Baseline
+    from fivebar_sim.regression.comparison import Checked
     from fivebar_sim.rollout import Plan, Result
 
 
@@ -44,8 +44,9 @@ def check(
             replaced when its scenario fails again, and never deleted.
         quiet: Print nothing but errors.
     """
-    from fivebar_sim import baseline, console
+    from fivebar_sim import console
     from fivebar_sim.files import resources
+    from fivebar_sim.regression import baseline
 
     _check_options(keep, updates_changed=update and bool(settings))
     sources = scenarios or tuple(resources.shipped("scenarios"))
@@ -68,13 +69,13 @@ def check(
 
 def _publish(checked: list[Checked], junit: Path | None, summary: Path | None) -> None:
     """Write the verdicts for a CI job, where it asked for them."""
-    from fivebar_sim import check_report
     from fivebar_sim.files import whole_file
+    from fivebar_sim.regression import ci_files
 
     if junit is not None:
-        whole_file.write(junit, check_report.junit(checked))
+        whole_file.write(junit, ci_files.junit(checked))
     if summary is not None:
-        whole_file.append(summary, check_report.markdown(checked))
+        whole_file.append(summary, ci_files.markdown(checked))
 
 
 def _check_options(keep: Path, *, updates_changed: bool) -> None:
@@ -124,24 +125,24 @@ def _alone(planned: Plan) -> Result | DivergedError:
 
 def _judge(planned: Plan, result: Result | DivergedError, old: Baseline | None) -> Checked:
     """Return a scenario's verdict; that it broke down is said at once."""
-    from fivebar_sim import regression
+    from fivebar_sim.regression import comparison
 
     if isinstance(result, DivergedError):
         say(result)
         name = planned.scenario.name
-        return regression.Checked(name, [], str(result).removeprefix(f"{name}: "), [])
-    return regression.compare(result, old)
+        return comparison.Checked(name, [], str(result).removeprefix(f"{name}: "), [])
+    return comparison.compare(result, old)
 
 
 def _update(
     checked: Checked, result: Result | DivergedError, old: Baseline | None, place: Path
 ) -> Checked:
     """Record a run that keeps its limits as the new baseline; return the verdict that is left."""
-    from fivebar_sim import baseline, regression
+    from fivebar_sim.regression import baseline, comparison
 
     if isinstance(result, DivergedError) or result.verdict != "pass":
         return checked._replace(notes=[*checked.notes, "its baseline is not updated: it failed"])
-    accepted, new = regression.accept(checked), baseline.record(result.metrics, old)
+    accepted, new = comparison.accept(checked), baseline.record(result.metrics, old)
     if new == old:
         return accepted
     baseline.write(place, new)

@@ -9,7 +9,7 @@ from xml.etree import ElementTree
 
 from fivebar_sim.metrics.catalogue import SHOWN, shown
 from fivebar_sim.metrics.limits import bounds
-from fivebar_sim.regression import BETTER, FAIL, Checked, Row
+from fivebar_sim.regression.comparison import BETTER, FAIL, Checked, Row
 
 NO_XML = re.compile("[^\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 """Characters that XML 1.0 has no way to write."""

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from fivebar_sim.baseline import Baseline, Recorded
 from fivebar_sim.metrics import guards
 from fivebar_sim.metrics.catalogue import LESS_IS_BETTER, SHOWN, shown
 from fivebar_sim.metrics.limits import Limit, bounds, look_up
+from fivebar_sim.regression.baseline import Baseline, Recorded
 
 if TYPE_CHECKING:
     from fivebar_sim.rollout import Result

@@ -11,7 +11,7 @@ from typing import Any
 import msgspec
 import tomli_w
 
-from fivebar_sim import control, regression, rollout
+from fivebar_sim import control, rollout
 from fivebar_sim.checks import check_number
 from fivebar_sim.control import Feedback, Setpoints
 from fivebar_sim.errors import ArgumentError, ConfigError, FiveBarError, unknown
@@ -20,6 +20,7 @@ from fivebar_sim.metrics import guards
 from fivebar_sim.metrics.catalogue import LIMIT_KEYS, SHOWN, shown
 from fivebar_sim.metrics.columns import Record
 from fivebar_sim.metrics.limits import Limit, bounds, judge
+from fivebar_sim.regression import comparison
 from fivebar_sim.rollout import Result
 from fivebar_sim.scenario import Scenario
 
@@ -71,7 +72,7 @@ class LegRun:
             ConfigError: The scenario has no limits, so that nothing would be asserted.
         """
         __tracebackhide__ = True
-        failures = regression.compare(self.result, None).failures
+        failures = comparison.compare(self.result, None).failures
         if failures:
             raise AssertionError("\n  ".join([f"{self.scenario.name} fails:", *failures]))
         if not self.limits:

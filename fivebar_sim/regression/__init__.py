@@ -1,0 +1,1 @@
+"""Runs against their limits and baselines."""
