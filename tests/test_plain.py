@@ -10,8 +10,7 @@ from pathlib import Path
 import pytest
 from shell import ELLIPSE, Said, Shell
 
-from fivebar_sim import plain
-from fivebar_sim.commands import common
+from fivebar_sim.cli import common, plain
 
 ODD = [
     *("\x1b[31mred", "\x07bell", "a\rb", "a\x0bb", "\x7fdel", "\x9b31m", "\u202eright", "\u2066in"),

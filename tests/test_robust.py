@@ -14,8 +14,8 @@ import pytest
 import rerun
 from shell import Shell
 
-from fivebar_sim import memory, rollout
-from fivebar_sim.commands import status
+from fivebar_sim import rollout
+from fivebar_sim.cli import memory, status
 from fivebar_sim.files import input_file
 from fivebar_sim.runs import directory, recording_file
 from fivebar_sim.scenario import scenario

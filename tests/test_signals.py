@@ -16,7 +16,7 @@ from pathlib import Path
 import pytest
 from shell import ELLIPSE, Shell, started
 
-from fivebar_sim import cli, signals
+from fivebar_sim.cli import program, signals
 from fivebar_sim.errors import ConfigError
 from fivebar_sim.runs import stored
 
@@ -115,7 +115,7 @@ def test_signal_whose_exception_is_lost_ends_the_program_all_the_same(
         lose(lambda: signal.raise_signal(sent))
         return 0
 
-    monkeypatch.setattr(cli, "_call", call)
+    monkeypatch.setattr(program, "_call", call)
     shell.capture.readouterr()
     assert _status() == status
     assert shell.capture.readouterr() == ("", said)
@@ -130,7 +130,7 @@ def test_lost_signal_ends_a_long_run_early(shell: Shell, monkeypatch: pytest.Mon
             time.sleep(0.01)
         raise AssertionError("it was never raised again")
 
-    monkeypatch.setattr(cli, "_call", call)
+    monkeypatch.setattr(program, "_call", call)
     assert _status() == 143
 
 
@@ -147,7 +147,7 @@ def test_tidying_up_is_not_interrupted(shell: Shell, monkeypatch: pytest.MonkeyP
             done.append("tidy")
         return 0
 
-    monkeypatch.setattr(cli, "_call", call)
+    monkeypatch.setattr(program, "_call", call)
     assert _status() == 143
     assert done == ["tidy"]
 
@@ -155,7 +155,7 @@ def test_tidying_up_is_not_interrupted(shell: Shell, monkeypatch: pytest.MonkeyP
 def _status() -> object:
     """Return how the program ends."""
     try:
-        return cli.main(["run"])
+        return program.main(["run"])
     except SystemExit as end:
         return end.code
 

@@ -47,7 +47,7 @@ def _show(run_dirs: tuple[Path, ...]) -> int:
 
 def _serve(run_dirs: tuple[Path, ...], port: int) -> int:
     """Serve the recording to browsers, until Ctrl-C, which is the way to end it: status 0."""
-    from fivebar_sim import signals
+    from fivebar_sim.cli import signals
     from fivebar_sim.recording import web
     from fivebar_sim.runs import recording_file
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 
-from fivebar_sim.plain import plain
+from fivebar_sim.cli.plain import plain
 
 FAILED, WRONG, INTERRUPTED, UNREAD = 1, 2, 130, 141
 

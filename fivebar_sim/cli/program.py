@@ -11,12 +11,12 @@ from collections.abc import Callable, Sequence
 from importlib.metadata import version
 from typing import Any
 
-from fivebar_sim import memory, plain, signals
-from fivebar_sim.commands.status import FAILED, INTERRUPTED, UNREAD, WRONG, say
+from fivebar_sim.cli import memory, plain, signals
+from fivebar_sim.cli.status import FAILED, INTERRUPTED, UNREAD, WRONG, say
 from fivebar_sim.errors import DivergedError, FiveBarError
 
 COMMANDS = ("run", "check", "replay", "report", "render", "view", "workspace")
-"""Each in the module of its name in `fivebar_sim.commands`."""
+"""Each in the module of its name in `fivebar_sim.cli`."""
 
 HELP = {"-h", "--help"}
 
@@ -79,7 +79,7 @@ def _call(args: list[str]) -> int:
 
 def _command(name: str) -> Callable[..., int]:
     """Return the function of a command; what it prints is plain."""
-    function = getattr(importlib.import_module(f"fivebar_sim.commands.{name}"), name)
+    function = getattr(importlib.import_module(f"fivebar_sim.cli.{name}"), name)
 
     @functools.wraps(function)
     def command(*args: Any, **options: Any) -> int:

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 from tyro.conf import arg
 
-from fivebar_sim.commands.common import Scenarios, Settings, plans_of, screen, working
-from fivebar_sim.commands.status import FAILED, WRONG, say
+from fivebar_sim.cli.common import Scenarios, Settings, plans_of, screen, working
+from fivebar_sim.cli.status import FAILED, WRONG, say
 from fivebar_sim.errors import ConfigError, DivergedError, RunDirectoryError
 
 if TYPE_CHECKING:
@@ -44,7 +44,7 @@ def check(
             replaced when its scenario fails again, and never deleted.
         quiet: Print nothing but errors.
     """
-    from fivebar_sim import console
+    from fivebar_sim.cli import console
     from fivebar_sim.files import resources
     from fivebar_sim.regression import baseline
 

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 from tyro.conf import arg
 
-from fivebar_sim.commands.common import Scenarios, Settings, plans_of, screen, working
-from fivebar_sim.commands.status import FAILED, say
+from fivebar_sim.cli.common import Scenarios, Settings, plans_of, screen, working
+from fivebar_sim.cli.status import FAILED, say
 from fivebar_sim.errors import ConfigError, DivergedError
 
 if TYPE_CHECKING:
@@ -80,7 +80,7 @@ def _run(
     """Run the plans one after the other; return the highest status."""
     import json
 
-    from fivebar_sim import console
+    from fivebar_sim.cli import console
 
     status, metrics = 0, {}
     out = screen()

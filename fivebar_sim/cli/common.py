@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from tyro.conf import Positional, UseAppendAction, arg
 
-from fivebar_sim import memory, plain
+from fivebar_sim.cli import memory, plain
 from fivebar_sim.errors import ConfigError, FiveBarError
 
 if TYPE_CHECKING:

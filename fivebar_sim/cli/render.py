@@ -7,7 +7,7 @@ from typing import Annotated
 
 from tyro.conf import Positional, arg
 
-from fivebar_sim.commands.common import working
+from fivebar_sim.cli.common import working
 
 
 def render(
