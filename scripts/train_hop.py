@@ -15,8 +15,8 @@ from typing import NamedTuple
 
 import msgspec
 import numpy as np
+from fivebar_controllers.servo import Servo as PathServo
 
-from controllers.servo import Servo as PathServo
 from fivebar_sim import motion
 from fivebar_sim.arrays import Array
 from fivebar_sim.control.servo import Servo

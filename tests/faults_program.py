@@ -8,13 +8,13 @@ from typing import Any
 
 import numpy as np
 from faults import Fault, Put, a_step_late, around, around_property
+from fivebar_controllers import gain_schedule
+from fivebar_controllers.computed_torque import ComputedTorque
+from fivebar_controllers.impedance import Impedance
+from fivebar_controllers.pd import Pd
+from fivebar_controllers.servo import Servo as Planned
 from msgspec.structs import replace as other
 
-from controllers import gain_schedule
-from controllers.computed_torque import ComputedTorque
-from controllers.impedance import Impedance
-from controllers.pd import Pd
-from controllers.servo import Servo as Planned
 from fivebar_sim import dynamics, kinematics, motion, rollout
 from fivebar_sim.control.servo import Servo
 from fivebar_sim.control.step import ControlStep

@@ -11,8 +11,8 @@ from pathlib import Path
 import msgspec
 import numpy as np
 import pytest
+from fivebar_controllers.servo import Servo
 
-from controllers.servo import Servo
 from fivebar_sim import control, motion, rollout
 from fivebar_sim.arrays import Array
 from fivebar_sim.errors import ConfigError
@@ -129,7 +129,9 @@ def test_another_name_keeps_the_keys_that_both_have(plug: Plug) -> None:
 
 
 def test_one_controller_seen_twice_is_one(plug: Plug) -> None:
-    plug("strangers", {"servo": "controllers.servo:Servo"})  # as from two copies of one package
+    plug(
+        "strangers", {"servo": "fivebar_controllers.servo:Servo"}
+    )  # as from two copies of one package
     assert control.find("servo") is Servo
 
 
@@ -141,7 +143,7 @@ def test_two_controllers_of_one_name_are_refused(plug: Plug) -> None:
     message = refused()
     assert "two controllers are called 'servo': " in message
     assert "strangers:Ahead" in message
-    assert "controllers.servo:Servo" in message
+    assert "fivebar_controllers.servo:Servo" in message
 
 
 def test_unknown_controller_is_refused_with_the_known_ones(plug: Plug) -> None:

@@ -9,15 +9,15 @@ from typing import Any
 import msgspec
 import numpy as np
 import pytest
+from fivebar_controllers.computed_torque import ComputedTorque
+from fivebar_controllers.gain_schedule import GainSchedule
+from fivebar_controllers.gravity_compensation import GravityCompensation
+from fivebar_controllers.impedance import Impedance
+from fivebar_controllers.pd import Pd
 from hypothesis import given
 from hypothesis import strategies as st
 from poses import BATCHES, RIGHT, RIGID, sample
 
-from controllers.computed_torque import ComputedTorque
-from controllers.gain_schedule import GainSchedule
-from controllers.gravity_compensation import GravityCompensation
-from controllers.impedance import Impedance
-from controllers.pd import Pd
 from fivebar_sim import control, dynamics, kinematics
 from fivebar_sim.arrays import Array
 from fivebar_sim.control import Observation, Reference

@@ -8,8 +8,8 @@ from typing import Any, ClassVar
 import msgspec
 import numpy as np
 import pytest
+from fivebar_controllers.pd import Pd
 
-from controllers.pd import Pd
 from fivebar_sim import rollout
 from fivebar_sim.arrays import Array
 from fivebar_sim.control import Observation, Reference

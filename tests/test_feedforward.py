@@ -11,10 +11,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from fivebar_controllers.servo import Servo as Law
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from controllers.servo import Servo as Law
 from fivebar_sim import dynamics, kinematics, model, motion
 from fivebar_sim.arrays import Array
 from fivebar_sim.control.servo import Servo

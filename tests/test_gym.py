@@ -11,10 +11,10 @@ import gymnasium
 import numpy as np
 import pytest
 from env_runs import SHORT, actions, played, scenario, task_of
+from fivebar_controllers.servo import Servo as Feedforward
 from gymnasium.utils.env_checker import check_env
 
 import fivebar_sim.gym
-from controllers.servo import Servo as Feedforward
 from fivebar_sim import Scenario, kinematics, motion, run
 from fivebar_sim.control.sensors import Sensors
 from fivebar_sim.control.servo import Servo

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from fivebar_controllers.pd import Pd
 from shell import Shell
 
-from controllers.pd import Pd
 from fivebar_sim import dynamics, kinematics, rollout, workspace
 from fivebar_sim.arrays import Array
 from fivebar_sim.control import Observation, Reference

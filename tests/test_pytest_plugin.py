@@ -104,7 +104,7 @@ def test_known_to_fail(leg_run):
     leg_run("strict.toml").assert_limits()
 
 def test_installed_controller_keeps_its_name(leg_run):
-    from controllers.servo import Servo
+    from fivebar_controllers.servo import Servo
 
     assert leg_run("mine.toml", controller=Servo()).scenario.controller_name == "servo"
 

@@ -14,9 +14,9 @@ from typing import NamedTuple
 import numpy as np
 import oracle
 import oracle_simulation
+from fivebar_controllers.servo import Servo as Law
 from mujoco.batch import Batch
 
-from controllers.servo import Servo as Law
 from fivebar_sim import dynamics, kinematics, rollout
 from fivebar_sim.arrays import Array
 from fivebar_sim.control.servo import Servo
