@@ -55,14 +55,16 @@ class LegPhysics(Physics):
 
     def step(self, nstep: int = 1) -> None:
         """Advance by steps, each with its row of ctrl, the last row repeated."""
-        model, data = self.model.ptr, self.data.ptr
+        model = self.model.ptr
+        data = self.data.ptr
         self.qpos = np.empty((nstep, model.nq))
         self.qvel = np.empty((nstep, model.nv))
         with quiet():
             for k in range(nstep):
                 data.ctrl[:] = self.ctrl[min(k, len(self.ctrl) - 1)]
                 mujoco.mj_step(model, data)
-                self.qpos[k], self.qvel[k] = data.qpos, data.qvel
+                self.qpos[k] = data.qpos
+                self.qvel[k] = data.qvel
 
     @property
     def warnings(self) -> int:
@@ -85,7 +87,8 @@ class LegTask(control.Task):
     outcome: Outcome
 
     def __init__(self, episodes: Episodes, random: np.random.Generator) -> None:
-        self.episodes, self._random = episodes, random
+        self.episodes = episodes
+        self._random = random
         self._names = list(episodes.task.parts)
         sizes = [part.size for part in episodes.task.parts.values()]
         self._cuts = np.cumsum(sizes)[:-1]
@@ -112,7 +115,8 @@ class LegTask(control.Task):
 
     def action_spec(self, physics: LegPhysics) -> Any:
         """Return the shape and the bounds of actions; the name says their parts."""
-        low, high = self.episodes.low, self.episodes.high
+        low = self.episodes.low
+        high = self.episodes.high
         name = "\t".join(f"{name}_{motor}" for name in self.episodes.task.actions for motor in "AE")
         return specs.BoundedArray(low.shape, np.float64, low, high, name)
 
@@ -176,11 +180,13 @@ def load(
     """
     if seed is not None and not (is_finite(seed) and seed >= 0 and seed == int(seed)):
         raise ArgumentError(f"seed must be a whole number in [0, inf), got {seed!r}")
+
     named = options if leg is None else {"leg": leg, **options}
     wanted = tasks.task(task, **named).resolved()
     drawn, models, starts = prepared(wanted, [model_seed], randomise)
     physics = LegPhysics.from_model(MjModel(models[0]))
     episodes = Episodes(wanted, drawn, starts)
+
     return control.Environment(
         physics,
         LegTask(episodes, np.random.default_rng(seed)),

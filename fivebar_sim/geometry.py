@@ -50,7 +50,8 @@ def capsule(length: float, radius: float, density: float) -> Link:
 
         I = m_c (L^2 / 12 + r^2 / 4) + m_s (2 r^2 / 5 + L^2 / 4 + 3 L r / 8)
     """
-    L, r = length, radius
+    L = length
+    r = radius
     m_c = density * math.pi * r**2 * L
     m_s = density * 4.0 / 3.0 * math.pi * r**3
     inertia = m_c * (L**2 / 12 + r**2 / 4) + m_s * (2 * r**2 / 5 + L**2 / 4 + 3 * L * r / 8)
@@ -65,7 +66,9 @@ def ball(radius: float, density: float) -> Link:
 
 def moved(body: Link, at: tuple[float, float], angle: float = 0.0) -> Link:
     """Return a body turned by angle [rad] about its frame's origin, then shifted by `at` [m]."""
-    (x, y), c, s = body.com, math.cos(angle), math.sin(angle)
+    x, y = body.com
+    c = math.cos(angle)
+    s = math.sin(angle)
     return Link(body.mass, (at[0] + c * x - s * y, at[1] + s * x + c * y), body.inertia)
 
 
@@ -145,14 +148,19 @@ class FiveBar:
     def __post_init__(self) -> None:
         for key in ("L1", "L2", "L3", "L4", "radius", "foot_radius"):
             _check(key, getattr(self, key), low=0.0, high=LONGEST, strict=True)
+
         for key in ("L5", "L6"):
             _check(key, getattr(self, key), low=0.0, high=LONGEST)
+
         for key in ("density", "armature"):
             _check(key, getattr(self, key), low=0.0, high=HEAVIEST, strict=key == "density")
+
         for key in ("bend", "tilt"):
             _check(key, getattr(self, key), low=-math.pi, high=math.pi)
+
         if not math.hypot(*self.foot_offset) > CLOSING * self.L2:
             raise GeometryError(f"L6: the foot lies on B; got L6 = L2 = {self.L6:g} m, bent back")
+
         self._check_modes()
         self._check_masses()
         object.__setattr__(self, "gravity", _floats("gravity", self.gravity, 2))
@@ -206,11 +214,13 @@ class FiveBar:
                 Link(m, (c, 0.0), i) for m, c, i in zip(self.mass, com, inertia, strict=True)
             )
             return L1, L2, L3, L4
+
         L1, L2, L3, L4 = (capsule(L, self.radius, self.density) for L in lengths)
         parts = [L2, moved(ball(self.foot_radius, self.density), self.foot_offset)]
         if self.L6 > 0.0:
             extension = capsule(self.L6, self.radius, self.density)
             parts.append(moved(extension, (self.L2, 0.0), self.bend))
+
         return L1, combined(*parts), L3, L4
 
     @property
@@ -239,6 +249,7 @@ class FiveBar:
         for key in table:
             if key not in known:
                 raise ConfigError(f"{where}: {unknown('key', key, known)}")
+
         try:
             values: dict[str, Any] = {
                 key: tuple(value) if isinstance(value, list) else value

@@ -32,7 +32,8 @@ def spaces(episodes: Episodes) -> tuple[Space[Array], Space[Array]]:
 
 def layout(task: Task) -> dict[str, slice]:
     """Return where an observation has each of its parts."""
-    found, start = {}, 0
+    found = {}
+    start = 0
     for name, part in task.parts.items():
         found[name] = slice(start, start + part.size)
         start += part.size
@@ -71,8 +72,10 @@ class LegEnv(gymnasium.Env[Array, Array]):
         if render_mode is not None and render_mode not in RENDER_MODES:
             raise ArgumentError(unknown("render_mode", str(render_mode), RENDER_MODES))
         self._group = LegGroup(tasks.task(task, **options), [model_seed], randomise)
-        self.render_mode, self._picture = render_mode, None
-        self.task, self.episodes = self._group.task, self._group.episodes
+        self.render_mode = render_mode
+        self._picture = None
+        self.task = self._group.task
+        self.episodes = self._group.episodes
         self.observation_space, self.action_space = spaces(self.episodes)
         self.layout = layout(self.task)
         self.metadata = {**self.metadata, "render_fps": 1.0 / self.task.period}

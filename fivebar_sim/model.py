@@ -107,13 +107,16 @@ def leg_spec(
         raise ArgumentError(unknown("integrator", str(integrator), get_args(Integrator)))
     if drive not in get_args(Drive):
         raise ArgumentError(unknown("drive", str(drive), get_args(Drive)))
+
     file = "leg.xml" if scene is None else f"scenes/{scene.kind}.xml"
     with quiet():
         spec = mujoco.MjSpec.from_file(str(resources.folder("models") / file))
+
     if timestep is not None:
         if not 0.0 < timestep < np.inf:
             raise ArgumentError(f"timestep must be in (0, inf) s, got {timestep!r}")
         spec.option.timestep = timestep
+
     spec.option.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{integrator.upper()}")
     gx, gz = leg.gravity
     spec.option.gravity = (gx, 0.0, gz)
@@ -124,6 +127,7 @@ def leg_spec(
     _weigh(spec, leg)
     _drive(spec, servo, drive)
     _close(spec, integrator, q)
+
     if isinstance(scene, Payload):
         _load(spec, leg, scene)
     elif isinstance(scene, Ground):
@@ -146,13 +150,16 @@ def _stand(spec: mujoco.MjSpec, leg: FiveBar, scene: Ground, q: Array) -> None:
     if scene.stop is not None:
         hip_z.range = (scene.stop, LONGEST)
         hip_z.limited = mujoco.mjtLimited.mjLIMITED_TRUE
+
     trunk = spec.body("trunk")
     trunk.mass = scene.mass
     trunk.ipos = (0.0, 0.0, 0.0)
     spec.geom("trunk").pos = (0.0, 0.0, 2.5 * leg.radius)
     spec.geom("foot").friction[0] = scene.friction
+
     if isinstance(scene, Treadmill):
         spec.geom("floor").surfacevel = (-(scene.speed or 0.0), 0.0, 0.0, 0.0, 0.0, 0.0)
+
     for key in spec.keys:
         key.qpos = (standing(leg, q), *q)
         key.ctrl = spec.key("home").ctrl
@@ -187,6 +194,7 @@ def _place(spec: mujoco.MjSpec, leg: FiveBar, q: Array) -> None:
         # about -y, so that a positive angle turns +x to +z
         spec.body(body).quat = (np.cos(angle / 2), 0.0, -np.sin(angle / 2), 0.0)
         spec.joint(joint).ref = angle
+
     along, across = leg.foot_offset
     for site, pos in {
         "foot": (along, 0.0, across),
@@ -194,6 +202,7 @@ def _place(spec: mujoco.MjSpec, leg: FiveBar, q: Array) -> None:
         "C_right": (leg.L3, 0.0, 0.0),
     }.items():
         spec.site(site).pos = pos
+
     spec.key("home").qpos = q
     spec.key("home").ctrl = (*[0.0] * (len(spec.actuators) - 2), *q[[0, 2]])
 
@@ -202,11 +211,13 @@ def _size(spec: mujoco.MjSpec, leg: FiveBar) -> None:
     """Give the geoms their lengths and radii; a leg with L6 gets one more, its extension."""
     for name in ("L1", "L2", "L3", "L4"):
         _capsule(spec.geom(name), leg.radius, (0.0, 0.0), (getattr(leg, name), 0.0))
+
     along, across = leg.foot_offset
     if leg.L6 > 0.0:
         extension = spec.body("L2").add_geom(spec.geom("L2").classname, name="L6")
         extension.material = spec.geom("L2").material
         _capsule(extension, leg.radius, (leg.L2, 0.0), (along, across))
+
     foot = spec.geom("foot")
     foot.pos = (along, 0.0, across)
     foot.size = (leg.foot_radius, 0.0, 0.0)
@@ -250,7 +261,8 @@ def _explicit(body: mujoco.MjsBody, link: Link) -> None:
 def _drive(spec: mujoco.MjSpec, servo: Servo | None, drive: Drive) -> None:
     """Set the motors at A and E: the law of `Servo`, or a bare motor, whose ctrl at rest is 0."""
     for name in ("A", "E"):
-        joint, actuator = spec.joint(name), spec.actuator(name)
+        joint = spec.joint(name)
+        actuator = spec.actuator(name)
         joint.damping[0] = 0.0 if servo is None else servo.passive(drive)
         if drive == "torque":
             actuator.set_to_motor()
@@ -265,6 +277,7 @@ def _drive(spec: mujoco.MjSpec, servo: Servo | None, drive: Drive) -> None:
         if servo.limit is not None:
             actuator.forcerange = (-servo.limit, servo.limit)
             actuator.forcelimited = mujoco.mjtLimited.mjLIMITED_TRUE
+
     if drive == "torque":
         spec.key("home").ctrl = np.zeros(len(spec.actuators))
 

@@ -85,12 +85,15 @@ def plan(
         kinematics.inverse(leg, foot.position)
     except UnreachableError as error:
         raise _out_of_reach(leg, foot.position, time, error) from None
+
     q, q_dot, q_ddot = kinematics.joint_motion(leg, *foot)
     rest = kinematics.home(leg)
     q = _continuous(rest, q)
     _check_stops(leg, rest, foot.position, time, q)
+
     if foot is not wanted:
         q_dot, q_ddot = rates(q, timestep)
+
     force = np.zeros_like(foot.position) if force is None else force
     return Motion(time, *foot, q, q_dot, q_ddot, force, payload)
 
@@ -110,7 +113,8 @@ def edge_margin(leg: FiveBar) -> float:
     """
     margins: list[float] = []
     for near, far in ((leg.L1, leg.L2), (leg.L4, leg.L3)):
-        square, product = near**2 + far**2, 2.0 * near * far * np.cos(KNEE_STOP)
+        square = near**2 + far**2
+        product = 2.0 * near * far * np.cos(KNEE_STOP)
         margins.append(near + far - np.sqrt(square + product))
         if near != far:
             margins.append(np.sqrt(square - product) - abs(near - far))
@@ -128,7 +132,8 @@ def rates(values: Array, timestep: float) -> tuple[Array, Array]:
         values: p at steps of h, (N + 1, n).
         timestep: h [s].
     """
-    before, after = 2.0 * values[:1] - values[1:2], 2.0 * values[-1:] - values[-2:-1]
+    before = 2.0 * values[:1] - values[1:2]
+    after = 2.0 * values[-1:] - values[-2:-1]
     p = np.concatenate([before, values, after])
     return (p[2:] - p[:-2]) / (2.0 * timestep), np.diff(p, 2, axis=0) / timestep**2
 
@@ -140,13 +145,17 @@ def _projected(leg: FiveBar, wanted: Sample, time: Array) -> Sample:
         if workspace.reachable(leg, targets, mode=leg.mode).all():
             return wanted
         raise ArgumentError(f'outside = "nearest" needs a leg with L6 = 0, got {leg.L6:g} m')
+
     foot = workspace.nearest(leg, targets, margin=edge_margin(leg), mode=leg.mode)
     if np.array_equal(foot, targets):
         return wanted
-    moved, fastest = _lengths(np.diff(foot, axis=0)), _lengths(np.diff(targets, axis=0)).max()
+
+    moved = _lengths(np.diff(foot, axis=0))
+    fastest = _lengths(np.diff(targets, axis=0)).max()
     jumps = np.concatenate([[False], moved > FASTEST_SLIDE * fastest])
     what = f"moves the nearest reachable point more than {FASTEST_SLIDE:g} times as fast as itself"
     _refuse(jumps, foot, time, what)
+
     return Sample(foot, *rates(foot, float(time[1])))
 
 

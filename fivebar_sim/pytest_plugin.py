@@ -114,7 +114,8 @@ def _draw(result: Result, place: Path) -> list[str]:
     from fivebar_sim.report import in_plane, look, over_time
     from fivebar_sim.runs.stored import StoredRun
 
-    run, names = StoredRun(place, result.scenario, result.record, result.metrics), []
+    run = StoredRun(place, result.scenario, result.record, result.metrics)
+    names = []
     with look.styled():
         for drawn in (in_plane.foot_path(run), over_time.tracking_error(run)):
             names.append(f"{drawn.key}.png")

@@ -83,7 +83,8 @@ def run_all(plans: Sequence[Plan], nthread: int = 1) -> list[Result]:
     results: dict[int, Result] = {}
 
     def alike(index: int) -> tuple[float, int, str, int, int]:
-        planned, scenario = plans[index], plans[index].scenario
+        planned = plans[index]
+        scenario = plans[index].scenario
         asked = 0 if planned.setpoints is not None else period_steps(planned)
         structure = scenario.scene.kind, planned.model.ngeom  # a leg with L6 has a geom more
         return planned.motion.timestep, scenario.steps, *structure, asked
@@ -117,15 +118,18 @@ def _result(planned: Plan, states: States) -> Result:
         _check_resolution(scenario)
     except DivergedError as error:
         raise broken(planned, states, error) from None
+
     record = columns(planned, states)
     lost = lost_path(scenario.leg, record)
     if lost is not None:
         far = f"it was {1e3 * scenario.leg.size:.4g} mm away from it at t = {lost:g} s"
         raise broken(planned, states, DivergedError(far, lost))
+
     try:
         measured = measure.measure(scenario, record, unrecorded(planned, states))
     except ArgumentError as error:  # torques that no motor could have
         raise broken(planned, states, DivergedError(str(error), scenario.sim.timestep)) from error
+
     limits = judge(measured, scenario.limits)
     good = all(limit.ok for limit in limits) and all(each["ok"] for each in measured["guards"])
     measured["verdict"] = "pass" if good else "fail"
@@ -133,12 +137,14 @@ def _result(planned: Plan, states: States) -> Result:
         {**limit._asdict(), "low": None if limit.low == -np.inf else limit.low} for limit in limits
     ]
     measured["provenance"] = provenance(scenario)
+
     return Result(scenario, record, measured, limits)
 
 
 def _check_resolution(scenario: Scenario) -> None:
     """Raise if a run has too few steps a period to tell how the foot followed."""
-    h, period = scenario.sim.timestep, scenario.path.period
+    h = scenario.sim.timestep
+    period = scenario.path.period
     if period is not None and not h < period / 4:
         raise DivergedError(
             f"the simulation cannot follow the path: the timestep must be below a quarter of its "

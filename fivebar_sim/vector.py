@@ -56,11 +56,14 @@ class LegVectorEnv(VectorEnv[Array, Array, Any]):
     ) -> None:
         if not (is_finite(num_envs) and num_envs >= 1 and num_envs == int(num_envs)):
             raise ArgumentError(f"num_envs must be in [1, inf), got {num_envs!r}")
+
         self.num_envs = int(num_envs)
         seeds = range(model_seed, model_seed + self.num_envs)
         self._group = LegGroup(tasks.task(task, **options), seeds, randomise, nthread)
-        self.task, self.episodes = self._group.task, self._group.episodes
-        self.drawn, self.layout = self._group.drawn, layout(self.task)
+        self.task = self._group.task
+        self.episodes = self._group.episodes
+        self.drawn = self._group.drawn
+        self.layout = layout(self.task)
         self.single_observation_space, self.single_action_space = spaces(self.episodes)
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
         self.action_space = batch_space(self.single_action_space, self.num_envs)
@@ -89,8 +92,10 @@ class LegVectorEnv(VectorEnv[Array, Array, Any]):
         else:
             seeding.np_random(seed)  # refuses what is no seed
             seeds = [seed + i for i in range(self.num_envs)]
+
         if len(seeds) != self.num_envs:
             raise ArgumentError(f"seed must be {self.num_envs} numbers, got {len(seeds)}")
+
         before = self._random or [None] * self.num_envs
         self._random = [
             random if one is None and random is not None else seeding.np_random(one)[0]

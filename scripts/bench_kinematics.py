@@ -31,7 +31,8 @@ def random_points(leg: FiveBar, count: int) -> Array:
 def side_angle(x: float, z: float, near: float, far: float, s: int) -> float:
     """Return one motor angle [rad], as `kinematics.reach.side_angle` does for arrays."""
     d2 = x * x + z * z
-    low, high = (near - far) ** 2, (near + far) ** 2
+    low = (near - far) ** 2
+    high = (near + far) ** 2
     slack = 16 * 2.0**-52 * high
     if not low - slack <= d2 <= high + slack:
         raise UnreachableError(f"the point is out of reach: {math.sqrt(d2):g} m from the motor")
@@ -42,7 +43,8 @@ def side_angle(x: float, z: float, near: float, far: float, s: int) -> float:
 
 def inverse(leg: FiveBar, x: float, z: float) -> tuple[float, float]:
     """Return (theta_A, theta_E) [rad] of one point of a leg with L6 = 0."""
-    x_E, z_E = 0.5 * leg.L5 * math.cos(leg.tilt), 0.5 * leg.L5 * math.sin(leg.tilt)
+    x_E = 0.5 * leg.L5 * math.cos(leg.tilt)
+    z_E = 0.5 * leg.L5 * math.sin(leg.tilt)
     s_A, s_E = leg.mode
     theta_A = side_angle(x + x_E, z + z_E, leg.L1, leg.L2, s_A)
     theta_E = side_angle(x - x_E, z - z_E, leg.L4, leg.L3, s_E)

@@ -32,7 +32,8 @@ def listening(address: str) -> str:
 def measure(address: str) -> tuple[float, float]:
     """Return how long the run takes alone and streamed [s], the medians."""
     plan = rollout.plan(Scenario.load("classic-ellipse", ["duration=60"]))
-    alone, streamed = [], []
+    alone = []
+    streamed = []
     for _ in range(ROUNDS):
         begun = time.perf_counter()
         rollout.execute(plan)
@@ -41,6 +42,7 @@ def measure(address: str) -> tuple[float, float]:
             begun = time.perf_counter()
             rollout.execute(plan, watch)
             streamed.append(time.perf_counter() - begun)
+
     return statistics.median(alone), statistics.median(streamed)
 
 

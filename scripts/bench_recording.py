@@ -35,15 +35,19 @@ def by_columns(path: Path, result: Result) -> float:
 
 def row_by_row(path: Path, result: Result) -> float:
     """Return the seconds that the same poses and scalars take with one call a row."""
-    leg, record = result.scenario.leg, result.record
-    stamps, drawn = record["time"], set(drawn_rows(record["time"]).tolist())
+    leg = result.scenario.leg
+    record = result.record
+    stamps = record["time"]
+    drawn = set(drawn_rows(record["time"]).tolist())
     moved = motion(record, np.arange(len(stamps)))
     frames = scene.link_frames(leg, moved.q)
-    foot, target = scene.in_space(moved.world_foot), scene.in_space(moved.target)
+    foot = scene.in_space(moved.world_foot)
+    target = scene.in_space(moved.target)
     plots = [(plot, np.cumsum(plot.shown) - 1) for plot in series(result.scenario, record)]
     start = time.perf_counter()
     stream = rr.RecordingStream("fivebar-rows", recording_id="rows")
     stream.save(path)
+
     for k, t in enumerate(stamps):
         stream.set_time("sim_time", duration=float(t))
         stream.set_time("step", sequence=k + 1)
@@ -59,6 +63,7 @@ def row_by_row(path: Path, result: Result) -> float:
                 stream.log(f"hip/{name}", pose)
             for entity, end in (("hip/target", target), *((b.entity, foot) for b in TRAIL)):
                 stream.log(entity, rr.LineStrips3D([np.stack([end[max(k - 10, 0)], end[k]])]))
+
     stream.disconnect()
     return time.perf_counter() - start
 
@@ -68,7 +73,8 @@ if __name__ == "__main__":
         path = Path(folder) / "a.rrd"
         short = rollout.run(Scenario.load("classic-ellipse", ["duration=10.0"]))
         rrd.write(path, [short])  # the imports
-        columns, size = by_columns(path, short), path.stat().st_size
+        columns = by_columns(path, short)
+        size = path.stat().st_size
         rows = row_by_row(path.with_name("rows.rrd"), short)
         rows_size = path.with_name("rows.rrd").stat().st_size
         long = rollout.run(Scenario.load("classic-ellipse", ["duration=60.0"]))

@@ -49,6 +49,7 @@ def ratio() -> tuple[float, float, float]:
         whole(scenario, Path(folder))  # the imports
         for _ in range(RUNS):
             pairs.append((whole(scenario, Path(folder)), raw(planned)))
+
     wholes, raws = zip(*pairs, strict=True)
     return (
         statistics.median(wholes),

@@ -45,7 +45,8 @@ def alone(task: tasks.Task, legs: int, threads: int) -> Stepper:
     """Return what steps the physics of a control period, and says how many steps that is."""
     batch = Batch(leg_group.model_of(task), legs, threads)
     batch.qpos = leg_group.starts(task)[0]
-    ctrl, rows = batch.bind("ctrl"), cycle(table(task, legs))
+    ctrl = batch.bind("ctrl")
+    rows = cycle(table(task, legs))
 
     def step() -> int:
         ctrl[:] = next(rows)
@@ -57,7 +58,8 @@ def alone(task: tasks.Task, legs: int, threads: int) -> Stepper:
 
 def vector(task: tasks.Task, legs: int, threads: int) -> Stepper:
     """Return what steps a vector environment."""
-    env, rows = LegVectorEnv(task, legs, threads), cycle(table(task, legs))
+    env = LegVectorEnv(task, legs, threads)
+    rows = cycle(table(task, legs))
     env.reset(seed=0)
 
     def step() -> int:
@@ -69,7 +71,8 @@ def vector(task: tasks.Task, legs: int, threads: int) -> Stepper:
 
 def single(task: tasks.Task) -> Stepper:
     """Return what steps one Gymnasium environment."""
-    env, rows = LegEnv(task), cycle(table(task, 1)[:, 0])
+    env = LegEnv(task)
+    rows = cycle(table(task, 1)[:, 0])
     env.reset(seed=0)
 
     def step() -> int:
@@ -83,7 +86,8 @@ def single(task: tasks.Task) -> Stepper:
 
 def dm_control(task: tasks.Task) -> Stepper:
     """Return what steps one dm_control environment."""
-    env, rows = environment.load(task, seed=0), cycle(table(task, 1)[:, 0])
+    env = environment.load(task, seed=0)
+    rows = cycle(table(task, 1)[:, 0])
     env.reset()
 
     def step() -> int:
@@ -95,7 +99,8 @@ def dm_control(task: tasks.Task) -> Stepper:
 
 def rate(step: Stepper, seconds: float = 0.15) -> float:
     """Return steps a second over a short time."""
-    done, start = 0, time.perf_counter()
+    done = 0
+    start = time.perf_counter()
     while time.perf_counter() < start + seconds:
         done += step()
     return done / (time.perf_counter() - start)
@@ -114,6 +119,7 @@ def show(kind: str, legs: int, threads: int, rounds: int = 15) -> None:
     for _ in range(rounds):
         for name, step in steppers.items():
             rates[name].append(rate(step))
+
     print(f"{kind}: {legs} legs, {threads} threads, {task.every} physics steps a control step")
     ours = rates["vector environment"]
     for name, found in rates.items():
@@ -126,7 +132,8 @@ def show_resets(count: int) -> None:
     env = LegEnv("track")
     for _ in range(count // 10):
         env.reset()
-    before, start = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss, time.perf_counter()
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    start = time.perf_counter()
     for _ in range(count):
         env.reset()
     seconds = time.perf_counter() - start

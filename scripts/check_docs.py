@@ -52,7 +52,8 @@ from shown import (
 
 ROOT = Path(__file__).resolve().parent.parent
 COPIED = ("docs", "examples", "models", "scenarios", "scripts", "tests", "pyproject.toml")
-CODE, DECIMAL = re.compile(r"`[^`]+`"), re.compile(r"\d\.\d")
+CODE = re.compile(r"`[^`]+`")
+DECIMAL = re.compile(r"\d\.\d")
 
 
 class Printed(NamedTuple):
@@ -67,14 +68,17 @@ def compare_row(labels: list[str], row: list[str], came: Printed) -> None:
     ended = next((cell for cell in row if cell.startswith("status ")), "")
     if came.status != (int(ended.split()[1].rstrip(":")) if ended else 0):
         raise WrongError(f"ends with status {came.status}:\n{came.text}")
+
     wrong: list[str] = []
     for label, cell in zip(labels[1:], row[1:], strict=True):
         if cell and cell == ended:
             compare_values(cell.partition(": ")[2], cell, came.text)
         elif label and cell:
-            shown, rest = tokens(cell), labelled(came.text, label)
+            shown = tokens(cell)
+            rest = labelled(came.text, label)
             if not alike(shown, rest[: len(shown)]):
                 wrong.append(f"{label} {cell}, printed is {' '.join(rest)}")
+
     if wrong:
         raise WrongError("shows " + "; ".join(wrong))
 
@@ -83,7 +87,8 @@ class Page:
     """A page's folder, and what was run in it."""
 
     def __init__(self, text: str, folder: Path, *, long: bool) -> None:
-        self.folder, self.long = folder, long
+        self.folder = folder
+        self.long = long
         self.items = list(items(text))
         self.outputs: dict[str, Printed] = {}
         self.ran = self.compared = self.left = 0
@@ -96,9 +101,11 @@ class Page:
                 shutil.copytree(ROOT / name, self.folder / name, ignore=ignored)
             else:
                 shutil.copy(ROOT / name, self.folder / name)
+
         (self.folder / ".venv").mkdir()
         for path in Path(sys.prefix).iterdir():
             (self.folder / ".venv" / path.name).symlink_to(path)
+
         program: list[str] = []
         for item in self.items:
             if item.title:
@@ -107,6 +114,7 @@ class Page:
             elif item.kind == "python" and not self.left_out(item):
                 program += [""] * (item.line - len(program))  # the page's own line numbers
                 program += item.text.splitlines()
+
         if program:
             (self.folder / "page.py").write_text("\n".join(program) + "\n", encoding="utf-8")
 
@@ -128,6 +136,7 @@ class Page:
             text=True,
             check=False,
         )
+
         return Printed(done.returncode, done.stdout)
 
     def command(self, line: str) -> Printed:
@@ -137,6 +146,7 @@ class Page:
             return self.shell("python page.py")
         if Path(name).name != "fivebar":
             return self.shell(line)
+
         from fivebar_sim import cli
 
         self.ran += 1
@@ -147,6 +157,7 @@ class Page:
             contextlib.redirect_stderr(said),
         ):
             status = cli.main(args)
+
         return Printed(status, said.getvalue())
 
     def succeeded(self, line: str) -> str:
@@ -168,20 +179,24 @@ class Page:
                 compare_row(labels, row, came)
             except WrongError as error:
                 wrong.append(f"{row[0]}: {error}")
+
         if wrong:
             raise WrongError("\n  ".join(wrong))
 
     def run(self, item: Item) -> None:
         """Run a block in a shell."""
         wanted = int(item.said) if item.note == "status" else 0
-        script, shown = item.text, ""
+        script = item.text
+        shown = ""
         if item.kind == "console":
             script = "\n".join(re.findall(r"^\$ (.*)", item.text, re.M))
             shown = re.sub(r"^\$ .*", "", item.text, flags=re.M)
             self.compared += 1
+
         came = self.shell(script)
         if came.status != wanted:
             raise WrongError(f"ends with status {came.status}, not {wanted}:\n{came.text}")
+
         if shown.strip():
             compare_lines(shown, came.text)
 
@@ -220,7 +235,8 @@ class Page:
 
 def check_page(name: str, *, long: bool) -> tuple[str, list[str]]:
     """Return a line about a page, and what is wrong in it."""
-    start, wrong = time.monotonic(), []
+    start = time.monotonic()
+    wrong = []
     with tempfile.TemporaryDirectory(prefix="docs-") as folder:
         try:
             page = Page((ROOT / name).read_text(encoding="utf-8"), Path(folder), long=long)
@@ -233,6 +249,7 @@ def check_page(name: str, *, long: bool) -> tuple[str, list[str]]:
                 page.check(item)
             except WrongError as error:
                 wrong.append(f"{name}:{item.line}: {error}")
+
     said = f"{page.ran} commands run, {page.compared} outputs compared, {page.left} left out"
     return f"{name}: {said}, {time.monotonic() - start:.0f} s", wrong
 
@@ -246,6 +263,7 @@ def main() -> int:
     found = sorted((ROOT / "docs").rglob("*.md"), key=lambda path: -path.stat().st_size)
     names = options.pages or ["README.md", *(str(path.relative_to(ROOT)) for path in found)]
     failed = False
+
     with ProcessPoolExecutor() as pool:
         for job in [pool.submit(check_page, name, long=options.long) for name in names]:
             line, wrong = job.result()

@@ -189,6 +189,7 @@ def main() -> int:
                     title = f"Python {version[0]}.{version[1]}, pip {pip}, {kind}"
                     print(f"{title}: {'; '.join(found) or 'as locked'}", flush=True)
                     wrong += found
+
     return 1 if wrong else 0
 
 

@@ -88,6 +88,7 @@ def environment(folder: Path, version: str) -> Path:
     here = sorted({sysconfig.get_path("purelib"), sysconfig.get_path("platlib")})
     lines = [f"import site; site.addsitedir({path!r})" for path in here]  # after its own
     (Path(purelib) / "here.pth").write_text("\n".join(lines) + "\n", encoding="utf-8")
+
     return python
 
 
@@ -126,6 +127,7 @@ def compared(here: Runs, there: Runs) -> list[Moved]:
             moved = Moved(key, name, value, now, tolerance, part)
             if key not in most or part > most[key].part:
                 most[key] = moved
+
     return list(most.values())
 
 
@@ -143,9 +145,11 @@ def show(title: str, here: Runs, there: Runs) -> bool:
         for each in moved:
             table.add_row(*cells(each))
         CONSOLE.print(table)
+
     bad = [f"{each.scenario} ({each.key})" for each in moved if each.part > 1.0]
     if bad:
         CONSOLE.print(f"beyond the tolerance: {', '.join(bad)}", highlight=False)
+
     return not bad
 
 
@@ -154,9 +158,11 @@ def cells(moved: Moved) -> list[str]:
     allowed = f"{moved.tolerance:.1e}"
     if moved.here is None or moved.there is None:
         return [moved.key, str(moved.here), str(moved.there), "", allowed, "", moved.scenario]
+
     change = moved.there - moved.here
     relative = f"{abs(change / moved.here):.0e}" if moved.here else ""
     part = f"{100.0 * moved.part:.1g} %"
+
     return [
         moved.key,
         f"{moved.here:.4g}",

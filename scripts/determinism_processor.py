@@ -78,19 +78,23 @@ def tiers() -> Iterator[tuple[str, dict[str, str]]]:
         yield "no AVX-512", {OFF: " ".join(new)}
     else:
         print("skipped: no AVX-512: NumPy uses none here", file=sys.stderr)
+
     settings = {}
     if features:
         settings[OFF] = " ".join(features)
     else:
         print("skipped: NumPy uses nothing newer than its baseline here", file=sys.stderr)
+
     if older_kernel():
         settings[KERNEL] = older_kernel()
     else:
         print("skipped: OpenBLAS has no other kernel here", file=sys.stderr)
+
     if libm_under(NO_FMA) != libm_under(""):
         settings[LIBC] = NO_FMA
     else:
         print("skipped: the C library computes no angle otherwise here", file=sys.stderr)
+
     if settings:
         yield "oldest", settings
 
@@ -106,10 +110,13 @@ def verify() -> int:
     stayed = set(os.environ.get(OFF, "").split()) & set(dispatched())
     asked = os.environ.get(KERNEL, "").lower()
     wrong = [f"{name} stayed on" for name in sorted(stayed)]
+
     if asked and kernel() != ALIASES.get(asked, asked):
         wrong.append(f"OpenBLAS uses {kernel()}, not {asked}")
+
     if os.environ.get(LIBC) and libm() == libm_under(""):
         wrong.append(f"the C library computes the same without {LIBC}")
+
     for each in wrong:
         print(f"processor: {each}", file=sys.stderr)
     return 1 if wrong else 0

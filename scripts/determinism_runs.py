@@ -84,7 +84,8 @@ def measure() -> dict[str, Any]:
     plans = [rollout.plan(Scenario.load(name)) for name in resources.shipped("scenarios")]
     runs = {}
     for result in rollout.run_all(plans, nthread=0):
-        name, digest = result.scenario.name, hashlib.sha256()
+        name = result.scenario.name
+        digest = hashlib.sha256()
         for key in sorted(result.record):
             digest.update(result.record[key].tobytes())
         recorded = baseline.read(baseline.place(name)) or baseline.record(result.metrics)
@@ -93,6 +94,7 @@ def measure() -> dict[str, Any]:
             for key, each in recorded.metrics.items()
         }
         runs[name] = {"metrics": metrics, "bits": digest.hexdigest()}
+
     return runs
 
 

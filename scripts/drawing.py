@@ -69,8 +69,10 @@ def draw(ax: Axes, leg: FiveBar) -> None:
     link(ax, p.C_left, p.F, "L6", LEFT, 5)
     link(ax, E, p.D, "L4", RIGHT, 5)
     link(ax, p.D, p.C_right, "L3", RIGHT, 5)
+
     for start, end in ((A, p.F), (E, p.C_right), (p.B, p.D)):
         ax.plot(*np.stack([start, end], axis=-1), color=GREY, lw=0.9, ls=(0, (5, 4)), zorder=1)
+
     beyond = p.C_left + 0.3 * (p.C_left - p.B)
     ax.plot(*np.stack([p.C_left, beyond], axis=-1), color=LEFT, lw=0.9, ls=":", zorder=1)
     for name, point, dx, dz in (
@@ -78,10 +80,12 @@ def draw(ax: Axes, leg: FiveBar) -> None:
         ("C", p.C_left, 6, -1), ("F", p.F, 0, -7),
     ):  # fmt: skip
         joint(ax, point, name, dx, dz)
+
     AF = p.F - A
     alpha = float(np.arctan2(AF[1], AF[0]))
     for motor in (A, E):
         ax.plot([motor[0], motor[0] + 17], [motor[1]] * 2, color=GREY, lw=0.9, ls=":", zorder=1)
+
     angle(ax, A, 0.0, float(q[0]), 9.0, r"$\theta_A$")
     angle(ax, A, alpha, float(q[0]), 19.0, r"$\beta$")
     angle(ax, A, 0.0, alpha, 14.0, r"$\alpha$")

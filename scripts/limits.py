@@ -45,10 +45,12 @@ def rewritten(text: str, limits: list[Limit]) -> str:
     for line in tail.split("\n"):
         found = LINE.fullmatch(line)
         if found and found["key"] in loose:
-            old, new = found["bounds"], bounds(loose[found["key"]])
+            old = found["bounds"]
+            new = bounds(loose[found["key"]])
             print(f"  {found['key']}: {old} -> {new}")
             line = f"{found['key']}{found['equals']}{new}{found['rest']}"
         lines.append(line)
+
     return head + table + "\n".join(lines)
 
 

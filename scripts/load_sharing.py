@@ -111,7 +111,8 @@ def serial(knee: int, *, belt: bool) -> Hold:
     return hold
 
 
-CLASSIC, EXTENDED = FiveBar.load("classic"), FiveBar.load("extended")
+CLASSIC = FiveBar.load("classic")
+EXTENDED = FiveBar.load("extended")
 LEGS = {
     "classic": five_bar(CLASSIC),
     "extended": five_bar(EXTENDED),
@@ -145,7 +146,9 @@ HEAD = """\
 
 def row(name: str, m: dict[str, Any]) -> str:
     """Return one line of a table."""
-    peak, rms, opposing = m["torque_peak"], m["torque_rms"], m["opposing"]
+    peak = m["torque_peak"]
+    rms = m["torque_rms"]
+    opposing = m["opposing"]
     net = round(1e3 * work(m, "net"), 1) + 0.0  # no -0.0
     return (
         f"{name:22s}{1e3 * peak['A']:6.0f}{1e3 * peak['E']:5.0f}{1e3 * rms['A']:7.0f}"
@@ -157,7 +160,8 @@ def row(name: str, m: dict[str, Any]) -> str:
 
 def held(gait: Cycle) -> str:
     """Return the table of the legs at rest in every pose, over the stance."""
-    lines, off = ["In stance, the links without weight and inertia", HEAD], 0.0
+    lines = ["In stance, the links without weight and inertia", HEAD]
+    off = 0.0
     for title, (slope, shear) in LOADS.items():
         lines.append(title)
         world = slope * PUSH * GAIT.stride * 2.0 / np.pi  # -integral F . dx, none of it by shear
@@ -191,6 +195,7 @@ def moving() -> str:
             lines.append(row(title, measured))
             parts = measured["phase"]["share_A"]
             shares.append(f"{title:22s}" + "".join(f"{100 * part:6.1f}" for part in parts))
+
     return "\n".join([*lines, *shares])
 
 
@@ -231,6 +236,7 @@ def worst(found: dict[str, Array]) -> str:
             peak, most = 1e3 * values[:, within].max(axis=1)
             cells.append(f"{limit:.1f}: {peak:4.0f} {most:6.1f}")
         lines.append(f"{name:22s}" + "    ".join(cells))
+
     for what, more in zip(
         ("a higher peak", "more heat"), found["classic"] - found[SERIAL], strict=True
     ):

@@ -203,6 +203,7 @@ def main() -> int:
     except KeyboardInterrupt:
         print("fivebar-sim could not be set up: interrupted", file=sys.stderr)
         return 130
+
     return 0
 
 

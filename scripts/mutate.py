@@ -87,6 +87,7 @@ def copy(room: Room, folder: Path) -> None:
             ignore=shutil.ignore_patterns("__pycache__", "*.rrd"),
             dirs_exist_ok=True,
         )
+
     options = ["-p", "no:cacheprovider", *(f"--deselect={test}" for test in SLOW)]
     config = CONFIG.format(
         files=json.dumps(room.files),
@@ -136,25 +137,31 @@ def test(name: str, folder: Path, sample: int | None, seed: int, processes: int)
     mutmut(folder, "make")
     killed = {k: v if v in VERDICTS else None for k, v in verdicts(folder).items()}
     names = sorted(killed)
+
     if sample is not None and sample < len(names):
         names = sorted(random.Random(seed).sample(names, sample))
+
     if left := [each for each in names if killed[each] is None]:
         mutmut(folder, "run", f"--max-children={processes}", *left)
+
     found = verdicts(folder)
     keep(folder, killed)
     came = {each: killed[each] or found[each] for each in names}
     counts: dict[str, int] = {}
     lived = []
+
     for each, code in came.items():
         word = VERDICTS.get(code or 0) or LIVED.get(code if code is not None else -1, "broken")
         counts[word] = counts.get(word, 0) + 1
         if word not in VERDICTS.values():
             lived.append((each, word))
+
     score = 1.0 - len(lived) / len(came)
     listed = ", ".join(f"{word} {count}" for word, count in sorted(counts.items()))
     print(f"{name}: {score:.1%} of {len(came)} mutants ({listed})")
     for each, word in lived:
         print(f"\n{each}: {word}\n{change(folder, each)}")
+
     sys.stdout.flush()
     return score
 
@@ -170,8 +177,10 @@ def main() -> int:
     parser.add_argument("--work", type=Path)
     parser.add_argument("--processes", type=int, default=2)
     options = parser.parse_args()
+
     if unknown := set(options.rooms) - set(ROOMS):
         parser.error(f"no such room: {', '.join(sorted(unknown))}")
+
     with tempfile.TemporaryDirectory() as temporary:
         scores = []
         for name in options.rooms or ROOMS:

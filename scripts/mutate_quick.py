@@ -101,9 +101,11 @@ def failing(folder: Path, tests: list[str]) -> str:
         finally:
             os.write(writer, came.encode())
             os._exit(0)  # what the parent opened is the parent's to close
+
     os.close(writer)
     with os.fdopen(reader) as pipe:
         came = pipe.read()
+
     os.waitpid(child, 0)
     return came or "took too long"
 
@@ -180,9 +182,11 @@ def candidates(work: Path, name: str) -> Iterator[tuple[Mutant, list[str]]]:
     """
     folder = work / name
     stats = json.loads((folder / "mutants" / "mutmut-stats.json").read_text(encoding="utf-8"))
-    seconds, reached = stats["duration_by_test"], stats["tests_by_mangled_function_name"]
+    seconds = stats["duration_by_test"]
+    reached = stats["tests_by_mangled_function_name"]
     dead = [each for each, code in mutate.verdicts(folder).items() if code in (1, 3)]
     random.Random(0).shuffle(dead)
+
     for each in dead:
         lines = mutate.change(folder, each).splitlines()
         if [line[0] for line in lines] == ["-", "+"]:
@@ -212,6 +216,7 @@ def renew(work: Path) -> int:
                 if test.startswith("tests/"):
                     rows.append(row._replace(test=test))
                     lacking -= 1
+
     text = "\n".join(sorted(row.block() for row in rows))
     TABLE.write_text(text, encoding="utf-8")
     return 0
@@ -229,6 +234,7 @@ def main() -> int:
     options = parser.parse_args()
     if options.renew is not None:
         return renew(options.renew.resolve())
+
     rows = table()
     return kill(rows if options.all else drawn(rows, options.count, options.seed))
 

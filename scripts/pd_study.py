@@ -24,7 +24,8 @@ if TYPE_CHECKING:
 
 OUT = Path(__file__).resolve().parent.parent / "docs" / "pd-study.svg"
 DURATION = 10.0  # [s]
-PD, SCHEDULE = "airhockey-pd", "airhockey-gain-schedule"
+PD = "airhockey-pd"
+SCHEDULE = "airhockey-gain-schedule"
 LINES = Scenario.load(PD).path.rest  # when the last of the lines ends [s]
 FREE = "servo={}"  # no torque limit
 THIN = 10  # one of so many steps is drawn
@@ -90,6 +91,7 @@ def outcomes() -> dict[str, Outcome]:
             found[name] = rollout.execute(plans.pop(name))
         except DivergedError as error:
             found[name] = error
+
     together = rollout.run_all(list(plans.values()), nthread=0)
     return found | dict(zip(plans, together, strict=True))
 
@@ -103,10 +105,15 @@ def row(name: str, outcome: Outcome) -> str:
     """Return one line of a table: RMS, max and torques are those of the four lines."""
     if isinstance(outcome, DivergedError):
         return f"{name:22s}left its path at t = {outcome.time:g} s, then broke down"
-    s, measured = outcome.scenario, outcome.metrics
-    period, limit = getattr(s.controller, "period", 0.0), s.servo.limit
-    tracking, load = measured["tracking"], measured["load"]
+
+    s = outcome.scenario
+    measured = outcome.metrics
+    period = getattr(s.controller, "period", 0.0)
+    limit = s.servo.limit
+    tracking = measured["tracking"]
+    load = measured["load"]
     flips = measured["branch"]["flips"]
+
     return (
         f"{name:22s}{1e3 * period:6g}{'-' if limit is None else f'{limit:g}':>7s}"
         f"{1e3 * tracking['rms']:7.2f}{1e3 * tracking['max']:7.1f}"
@@ -135,7 +142,8 @@ def draw_path(ax: Axes, result: Result, title: str) -> None:
     from matplotlib.collections import LineCollection
 
     ax.plot(*columns(result, "target").T, color="#bbbbbb", lw=4.0, solid_capstyle="round")
-    foot, time = columns(result, "foot"), result.record["time"][::THIN]
+    foot = columns(result, "foot")
+    time = result.record["time"][::THIN]
     starts = np.arange(0, len(foot) - 1, 5)  # pieces of 50 ms
     coloured = LineCollection(
         [foot[k : k + 6] for k in starts],
@@ -161,7 +169,8 @@ def draw_moved(ax: Axes, result: Result) -> None:
 
 def draw_slow(ax: Axes, found: dict[str, Outcome]) -> Result:
     """Draw the schedule's path, and the PD's until it left it; return that shortened run."""
-    error, schedule = found["PD"], found["schedule"]
+    error = found["PD"]
+    schedule = found["schedule"]
     assert isinstance(error, DivergedError)
     assert isinstance(schedule, Result)
     draw_path(ax, schedule, "schedule at 10 ms")
@@ -171,6 +180,7 @@ def draw_slow(ax: Axes, found: dict[str, Outcome]) -> Result:
     ax.plot(*foot.T, color="#2b8a3e", lw=1.0)
     ax.plot(*foot[-1], "x", color="#2b8a3e")
     ax.text(0.35, 0.3, "PD (150, 5)", fontsize=8, color="#2b8a3e", ha="right", va="top")
+
     return short
 
 
@@ -179,7 +189,8 @@ def draw_errors(ax: Axes, results: dict[str, Result]) -> None:
     for (name, result), colour in zip(
         results.items(), ("#1f77b4", "#e67e22", "#2b8a3e", "#c0392b"), strict=True
     ):
-        error, time = 1e3 * tracking_error(result.record), result.record["time"]
+        error = 1e3 * tracking_error(result.record)
+        time = result.record["time"]
         ax.semilogy(time, error, color=colour, lw=1.0, label=name, rasterized=True)
     ax.set(xlim=(0.0, LINES + 0.5), ylim=(1e-2, 2e4), xlabel="time [s]")
     ax.set_title("foot off its target [mm]", fontsize=9)
@@ -196,14 +207,17 @@ def draw(found: dict[str, Outcome], out: Path) -> None:
     held = {name: outcome for name, outcome in found.items() if isinstance(outcome, Result)}
     figure = Figure(figsize=(10.0, 4.6), layout="constrained")
     axes = figure.subplots(2, 3)
+
     for ax, kp in zip(axes[0], (5, 50, 150), strict=True):
         draw_path(ax, held[f"kp = {kp}"], f"kp = {kp}")
+
     draw_moved(axes[1, 0], held["moved, kp = 150"])
     short = draw_slow(axes[1, 1], found)
     for ax, left in zip(axes.flat[:5], (-0.55, -0.55, -0.55, -0.15, -0.55), strict=True):
         ax.set(xlim=(left, left + 1.03), ylim=(0.16, 0.7), xlabel="x [m]", ylabel="z [m]")
         ax.set_aspect("equal")
         ax.grid(color="#dddddd", linewidth=0.6)
+
     draw_errors(
         axes[1, 2],
         {

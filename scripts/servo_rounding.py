@@ -55,20 +55,24 @@ def measure(leg: FiveBar, step: float) -> Rounding:
     foot = np.stack(np.meshgrid(line, line), axis=-1).reshape(-1, 2)
     theta = kinematics.inverse_all(leg, foot)[:, MODES.index(leg.mode)]
     found = np.isfinite(theta[:, 0])
-    foot, theta = foot[found], theta[found]
+    foot = foot[found]
+    theta = theta[found]
     points = points_at(leg, foot, theta)
     good = kinematics.branch(leg, points).assembly == leg.assembly
     good &= in_range(leg, theta, hobby.HANGING)
-    foot, theta = foot[good], theta[good]
+    foot = foot[good]
+    theta = theta[good]
 
     bound = hobby.rounding_bound(leg, theta)
     finite = np.isfinite(bound.remainder)
-    foot, theta = foot[finite], theta[finite]
+    foot = foot[finite]
+    theta = theta[finite]
     error = hobby.rounding_error(leg, theta)
     p = points_at(leg, foot, theta)
     gamma = np.abs(angle_between(p.C_left - p.B, p.C_left - p.D))
     margin_deg = np.degrees(np.minimum(gamma, np.pi - gamma))
     length = np.hypot(error[:, 0], error[:, 1])
+
     return Rounding(foot, length, bound.first[finite], bound.total[finite], margin_deg)
 
 
@@ -85,6 +89,7 @@ def report(poses: Rounding) -> str:
             f"{margin:6.0f} deg  {r.error.size:10d}   {1e3 * r.error[k]:6.3f} mm   "
             f"({x:6.1f}, {z:6.1f}) mm   {1e3 * r.total[k]:8.3f} mm   {rms:.3f} mm"
         )
+
     lines.append(
         f"from {MARGINS_DEG[-1]:g} deg on: bound {1e3 * r.total.max():.3f} mm at most, of it to "
         f"first order {1e3 * r.first.max():.3f} mm; error / bound {(r.error / r.total).max():.3f} "
@@ -103,13 +108,16 @@ def draw(leg: FiveBar, poses: Rounding, out: Path) -> None:
     figure = Figure(figsize=(8.0, 4.0), layout="constrained")
     axes = figure.subplots(1, 2, sharex=True, sharey=True)
     rest = kinematics.home(leg)
-    (A, E), p = kinematics.bases(leg), kinematics.closed_points(leg, rest[[0, 2]])
+    A, E = kinematics.bases(leg)
+    p = kinematics.closed_points(leg, rest[[0, 2]])
     sides = 1e3 * np.array([A, p.B, p.F, p.D, E])
 
     corner = poses.foot.min(axis=0)
     column, row = np.rint((poses.foot - corner) / DRAWN).astype(int).T
     left, low = 1e3 * (corner - 0.5 * DRAWN)
-    image, colours = None, mpl.colormaps["viridis"]
+    image = None
+    colours = mpl.colormaps["viridis"]
+
     for ax, values, title in (
         (axes[0], poses.error, "foot error of whole degrees"),
         (axes[1], poses.total, "its bound"),
@@ -129,9 +137,11 @@ def draw(leg: FiveBar, poses: Rounding, out: Path) -> None:
         )
         ax.plot(sides[:, 0], sides[:, 1], "o-", color="#2b2d31", linewidth=2.0, markersize=4.0)
         ax.set(title=title, xlabel="x [mm]", aspect="equal")
+
     axes[0].set_ylabel("z [mm]")
     if image is not None:
         figure.colorbar(image, ax=axes, label="[mm]", extend="max")
+
     figure.savefig(out, metadata={"Date": None})
 
 

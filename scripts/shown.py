@@ -32,9 +32,12 @@ class Item(NamedTuple):
 
 def items(page: str) -> Iterator[Item]:
     """Yield the items of a page in order."""
-    lines, at, note = page.splitlines(), 0, ("", "")
+    lines = page.splitlines()
+    at = 0
+    note = ("", "")
     while at < len(lines):
-        start, line = at, lines[at]
+        start = at
+        line = lines[at]
         if line.startswith("```"):
             if "```" not in lines[at + 1 :]:
                 raise WrongError(f"line {start + 1}: a block without an end")
@@ -42,33 +45,39 @@ def items(page: str) -> Iterator[Item]:
             language, _, rest = line[3:].partition(" ")
             kind = language or "text"
             named = re.fullmatch(r'title="(.+)"', rest)
-            title, body = named[1] if named else "", lines[start + 1 : at]
+            title = named[1] if named else ""
+            body = lines[start + 1 : at]
         elif line.startswith("<!--"):
             while "-->" not in lines[at] and at + 1 < len(lines):
                 at += 1
             found = NOTE.fullmatch("\n".join(lines[start : at + 1]))
             if found is None:
                 raise WrongError(f"line {start + 1}: no such comment: {line}")
-            at, note = at + 1, (found[1], " ".join(found[2].split()))
+            at = at + 1
+            note = (found[1], " ".join(found[2].split()))
             continue
         elif not line:
             at += 1
             continue
         else:
-            kind, title = "table" if line.startswith("|") else "paragraph", ""
+            kind = "table" if line.startswith("|") else "paragraph"
+            title = ""
             while at + 1 < len(lines) and lines[at + 1] and lines[at + 1][:3] not in ("```", "<!-"):
                 at += 1
             body = lines[start : at + 1]
         yield Item(kind, start + 1, "\n".join(body), title, *note)
-        at, note = at + 1, ("", "")
+        at = at + 1
+        note = ("", "")
 
 
 def close(shown: str, came: str) -> bool:
     """Return whether a printed number is the one that a page shows."""
-    a, b = Decimal(shown.replace(",", "")), Decimal(came.replace(",", ""))
+    a = Decimal(shown.replace(",", ""))
+    b = Decimal(came.replace(",", ""))
     if 0 < abs(a) < NOISE:
         return abs(b) <= 10 * abs(a)
-    digits, exponent = a.as_tuple().digits, int(a.as_tuple().exponent)
+    digits = a.as_tuple().digits
+    exponent = int(a.as_tuple().exponent)
     return abs(a - b) <= Decimal(1 if len(digits) >= 3 else 0.5).scaleb(exponent)
 
 
@@ -96,6 +105,7 @@ def compare_lines(shown: str, came: str) -> None:
     """Raise unless all lines shown are in what came, in order."""
     if not tokens(shown):
         raise WrongError(f"shows nothing of\n{came}")
+
     rest = [tokens(line) for line in came.splitlines()]
     for line in filter(tokens, shown.splitlines()):
         parts = [tokens(part) for part in line.split("...")]

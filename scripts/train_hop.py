@@ -32,7 +32,9 @@ HARMONICS = 4
 WEIGHTS = 2 * (2 * HARMONICS + 1)
 SIGMA = 0.15  # [rad], the first policies' deviation
 EXCESS = 1.0  # what a square radian beyond the bounds costs, per control step
-TRAINED, SHOWN = 2.0, 4.0  # [s], episodes
+# [s], episodes
+TRAINED = 2.0
+SHOWN = 4.0
 PATH = "hop path, no limit"
 FINE = 0.001  # [s], control period of what is measured
 RAIL = Scenario.load("rail-hop", ["scene.drop=0"])  # an episode begins on the floor
@@ -52,12 +54,17 @@ class Cma:
     """
 
     def __init__(self, size: int, population: int, sigma: float, random: np.random.Generator):
-        self.mean, self.sigma = np.zeros(size), sigma
-        self._population, self._random, self._age = population, random, 0
+        self.mean = np.zeros(size)
+        self.sigma = sigma
+        self._population = population
+        self._random = random
+        self._age = 0
         rank = np.arange(1, population // 2 + 1)
         self._w = np.log((population + 1) / 2) - np.log(rank)
         self._w /= self._w.sum()
-        self._C, self._p_c, self._p_s = np.eye(size), np.zeros(size), np.zeros(size)
+        self._C = np.eye(size)
+        self._p_c = np.zeros(size)
+        self._p_s = np.zeros(size)
         self._mu = mu = 1.0 / float((self._w**2).sum())
         self._c_c = (4.0 + mu / size) / (size + 4.0 + 2.0 * mu / size)
         self._c_s = (mu + 2.0) / (size + mu + 5.0)
@@ -69,7 +76,8 @@ class Cma:
     def ask(self) -> Array:
         """Return the points of a generation, (population, N)."""
         values, self._B = np.linalg.eigh(self._C)
-        self._D, shape = np.sqrt(values), (self._population, len(self.mean))
+        self._D = np.sqrt(values)
+        shape = (self._population, len(self.mean))
         self._y = (self._random.standard_normal(shape) * self._D) @ self._B.T
         return self.mean + self.sigma * self._y
 
@@ -85,7 +93,8 @@ class Cma:
         length = float(np.linalg.norm(self._p_s)) / self._chi
         far = np.sqrt(1.0 - (1.0 - c) ** (2 * self._age)) * (1.4 + 2.0 / (len(step) + 1.0))
         h = float(length < far)
-        c_1, c = self._c_1, self._c_c
+        c_1 = self._c_1
+        c = self._c_c
         self._p_c = (1.0 - c) * self._p_c + h * np.sqrt(c * (2.0 - c) * self._mu) * step
         kept = 1.0 - c_1 - self._c_mu + (1.0 - h) * c_1 * c * (2.0 - c)
         spread = np.einsum("i,ij,ik->jk", self._w, y, y)
@@ -108,7 +117,9 @@ def wished(legs: LegVectorEnv, weights: Array, phase: Array) -> Array:
 
 def policies(legs: LegVectorEnv, weights: Array) -> Act:
     """Return policies, one a leg."""
-    low, high, phase = legs.episodes.low, legs.episodes.high, legs.layout["phase"]
+    low = legs.episodes.low
+    high = legs.episodes.high
+    phase = legs.layout["phase"]
     return lambda _, seen: np.clip(wished(legs, weights, seen[:, phase]), low, high)
 
 
@@ -161,23 +172,31 @@ class Played(NamedTuple):
 def play(legs: LegVectorEnv, act: Act, seeds: list[int]) -> Played:
     """Return what legs did in an episode from the starts of some seeds."""
     seen, _ = legs.reset(seed=seeds)
-    task, zero = legs.task, np.zeros(legs.num_envs)
+    task = legs.task
+    zero = np.zeros(legs.num_envs)
     on = zero == 0.0
     reward, effort, ran, foot, hip, flight, longest = (zero.copy() for _ in range(7))
-    rows, at = list[Array](), legs.layout
+    rows = list[Array]()
+    at = legs.layout
+
     for step in range(task.periods):
         seen, got, terminated, _, info = legs.step(act(step, seen))
         hip_z, contact = (seen[:, at[name]][:, 0] for name in ("hip_z", "contact"))
         height = hip_z + seen[:, at["foot"]][:, 1] - task.leg.foot_radius
         ran += on
-        reward, effort = reward + got * on, effort + info["terms"]["effort"] * on
-        foot, hip = np.maximum(foot, height * on), np.maximum(hip, hip_z * on)
+        reward = reward + got * on
+        effort = effort + info["terms"]["effort"] * on
+        foot = np.maximum(foot, height * on)
+        hip = np.maximum(hip, hip_z * on)
         flight = (flight + 1.0) * (on & (contact == 0.0))
         longest = np.maximum(longest, flight)
         rows.append(hip_z)
         on &= ~terminated
+
     torque = np.sqrt(effort / (2.0 * ran))  # effort is the sum over A and E
-    mean, longest = reward / task.periods, longest * task.period
+    mean = reward / task.periods
+    longest = longest * task.period
+
     return Played(mean, foot, hip, longest, torque, ~on, np.array(rows))
 
 
@@ -207,7 +226,8 @@ def train(generations: int, seed: int, duration: float = TRAINED) -> Iterator[Ge
         fitness = played.reward - EXCESS * excess(legs, weights)
         search.tell(fitness)
         foot = float(played.foot[np.argmax(fitness)])
-        best, average = float(fitness.max()), float(fitness.mean())
+        best = float(fitness.max())
+        average = float(fitness.mean())
         yield Generation(best, average, foot, search.sigma, search.mean)
 
 
@@ -224,8 +244,12 @@ def show(weights: Array) -> dict[str, Played]:
     """Return episodes of 4 s: 64 starts of a policy, as many random ones, and the hop path's."""
     legs = LegVectorEnv("hop", LEGS, THREADS, servo=SERVO, duration=SHOWN, period=FINE)
     trained = policies(legs, np.tile(weights, (LEGS, 1)))
-    low, high = legs.episodes.low, legs.episodes.high
-    random, shape, seeds = np.random.default_rng(0), (LEGS, len(low)), list(range(LEGS))
+    low = legs.episodes.low
+    high = legs.episodes.high
+    random = np.random.default_rng(0)
+    shape = (LEGS, len(low))
+    seeds = list(range(LEGS))
+
     return {
         "trained": play(legs, held(trained), seeds),
         "random setpoints": play(legs, held(lambda *_: random.uniform(low, high, shape)), seeds),
@@ -264,13 +288,16 @@ def draw(found: list[Generation], shown: dict[str, Played], out: Path) -> None:
     left.set(title="reward a control step, 1 at most", xlabel="generation")
     left.legend(fontsize=8)
     rows = np.arange(0, 1500, 4)
+
     for name, colour in (("trained", "#1f77b4"), (PATH, "#e67e22")):
         hip = 1e3 * shown[name].hip_z[rows, 0]
         right.plot((rows + 1) * FINE, hip, color=colour, label=name.split(",")[0])
+
     right.set(title="height of the hip [mm]", xlabel="time [s]")
     right.legend(fontsize=8, loc="lower right")
     for ax in (left, right):
         ax.grid(color="#dddddd", linewidth=0.6)
+
     figure.savefig(out, metadata={"Date": None})
 
 
@@ -280,8 +307,10 @@ def main() -> None:
     parser.add_argument("--generations", type=int, default=40)
     parser.add_argument("--seed", type=int, default=0)
     chosen = parser.parse_args()
-    found, start = list[Generation](), time.perf_counter()
+    found = list[Generation]()
+    start = time.perf_counter()
     print("generation  best   mean   foot of the best   step size")
+
     for each in train(chosen.generations, chosen.seed):
         found.append(each)
         if len(found) % 5 == 0 or len(found) == 1:
@@ -289,6 +318,7 @@ def main() -> None:
                 f"{len(found):10d}{each.best:6.3f}{each.average:7.3f}"
                 f"{1e3 * each.foot:14.1f} mm{each.sigma:14.3f} rad"
             )
+
     print(f"trained in {time.perf_counter() - start:.0f} s")
     shown = show(found[-1].mean)
     print(report(shown))

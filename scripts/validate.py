@@ -78,6 +78,7 @@ def energy(timesteps: tuple[float, ...]) -> dict[str, chain.Swing]:
     kept = drawn["reference"]
     rows = [["reference", "", f"{kept.ripple:.0e}", f"{kept.drift:.0e}", "0", "0"]]
     rate = float(chain.squared_rates().mean())
+
     for integrator in air.INTEGRATORS:
         for h in timesteps:
             swing = chain.swing(integrator, h)
@@ -86,6 +87,7 @@ def energy(timesteps: tuple[float, ...]) -> dict[str, chain.Swing]:
             told = rate * h if integrator == "discrete" else 0.0
             parts = [percent(swing.ripple), percent(swing.drift)]
             rows.append([integrator, f"{1e3 * h:g}", *parts, f"{swing.decay:.3g}", f"{told:.3g}"])
+
     show(
         "b. energy of classic on undamped springs, 10 s, in parts of what swings",
         "integrator | h [ms] | first 0.1 s [%] | first to last second [%] | decay [1/s] | w^2 h",
@@ -106,6 +108,7 @@ def convergence(timesteps: tuple[float, ...]) -> Errors:
                 for h in timesteps
             ]
         )
+
     series = list(dict.fromkeys(key._replace(timestep=0.0) for key in found))
     rows = []
     for kind in series:
@@ -117,6 +120,7 @@ def convergence(timesteps: tuple[float, ...]) -> Errors:
             for name in ("foot", "late", "start", "gap")
         ]
         rows.append([", ".join(kind[:3]), *cells, *(f"{p:.2f}" for p in orders)])
+
     steps = " | ".join(f"{1e3 * h:g} ms" for h in timesteps)
     show(
         "c. foot off the oracle's [um], and orders in h of foot, torque (late, start) and loop gap",
@@ -128,6 +132,7 @@ def convergence(timesteps: tuple[float, ...]) -> Errors:
         e, last = (found[kind._replace(timestep=h)] for h in (1e-3, min(timesteps)))
         parts = [percent(p) for p in (e.rms, e.late, e.start, last.late, e.sensor, last.sensor)]
         rows.append([", ".join(kind[:3]), *parts, percent(e.share), um(e.gap)])
+
     show(
         f"c, d. motor torque in the air at 1 ms (fine: at {1e3 * min(timesteps):g} ms), worse "
         "of A and E, in % of the oracle's RMS",
@@ -150,6 +155,7 @@ def squats(timesteps: tuple[float, ...]) -> None:
             lengths = [um(x) for x in (e.depth, e.hip, e.foot_x, e.gap)]
             name = f"{preset}, {key.integrator}" + (", hard contact" if hard else "")
             rows.append([name, f"{1e3 * key.timestep:g}", *cells, *lengths])
+
     show(
         "d. squat on a frictionless floor: torque and N in % of the oracle's RMS, lengths in um",
         "run | h [ms] | RMS | late | N | sunk in | hip, rest | foot x | gap",
@@ -161,6 +167,7 @@ def squats(timesteps: tuple[float, ...]) -> None:
         off = 100 * g.side_off / g.side
         cells = [percent(g.error.rms), percent(g.error.late), f"{g.side:.2f}", f"{off:.1f}"]
         rows.append([f"classic, noslip_iterations = {noslip}", *cells, f"{1e6 * g.creep:.0f}"])
+
     show(
         "d. squat with friction 1, discrete, 1 ms, against a ball that rolls without slip",
         "run | RMS [%] | late [%] | side force [N] | off [%] | creep [um/s]",
@@ -179,6 +186,7 @@ def at_rest() -> None:
                 cells.append(percent(air.worst(tau - need) / air.worst(need)))
             cells.append(percent(abs(carried - 1.0)))
         rows.append([preset, *cells])
+
     show(
         "e. standing still, 1 ms [%]: torque off dynamics.inverse, N off the weight",
         "preset | discrete | aside | N | implicitfast | aside | N",
@@ -204,6 +212,7 @@ def flips(cells: int) -> None:
                 numbers = [c.places, c.assembly, c.mode, c.broken, f"{1e3 * c.moved:.2f}"]
                 run = f"{preset}, {name}, {integrator}, {up * flip.FORCE:+.0f} N"
                 rows.append([run, *map(str, numbers), um(c.gap), where])
+
     show(
         "g. 80 N at every reachable place: at how many the leg flips",
         "run | places | assembly | knee | broken | moved [mm] | gap [um] | flipped at [mm]",
@@ -213,8 +222,10 @@ def flips(cells: int) -> None:
     for preset in stance.HANGING:
         for integrator in air.INTEGRATORS:
             m = stance.drop(preset, integrator).metrics
-            gap, force = um(m["closure"]["max"]), f"{m['ground']['force_max']['z']:.0f}"
+            gap = um(m["closure"]["max"])
+            force = f"{m['ground']['force_max']['z']:.0f}"
             rows.append([f"{preset}, {integrator}", str(m["branch"]["flips"]), gap, force])
+
     show("g. landing from 50 cm, 1 ms", "run | flips | gap [um] | N max [N]", rows)
 
 
@@ -241,11 +252,13 @@ def draw(errors: Errors, swings: dict[str, chain.Swing]) -> None:
         if column == 0:
             ax.set_ylabel("foot off the reference [um]")
             ax.legend(fontsize=7, title="o discrete, x implicitfast", title_fontsize=7)
+
     ax = figure.add_subplot(grid[1, :])
     for (name, swing), colour in zip(swings.items(), COLOURS, strict=False):
         block = round(0.05 / float(swing.time[1] - swing.time[0]))
         means = swing.energy[: len(swing.energy) // block * block].reshape(-1, block).mean(axis=1)
         ax.plot(0.05 * (np.arange(len(means)) + 0.5), means, color=colour, lw=1.0, label=name)
+
     ax.set(title="energy on undamped springs, means of 50 ms", xlabel="time [s]")
     ax.set_ylabel("part of the start's")
     ax.set_ylim(0.0, 1.4)
@@ -267,6 +280,7 @@ def main() -> None:
     squats(steps)
     at_rest()
     flips(6 if quick else 14)
+
     if not quick:
         draw(errors, swings)
 

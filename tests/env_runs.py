@@ -62,7 +62,8 @@ def task_of(kind: str, run: Scenario, **options: Any) -> tasks.Task:
 def actions(task: tasks.Task, seed: int = 0) -> Array:
     """Return actions that shake the leg within its branch, a row a control step."""
     low, high = task.bounds
-    middle, half = 0.5 * (low + high), 0.5 * (high - low)
+    middle = 0.5 * (low + high)
+    half = 0.5 * (high - low)
     shake = np.random.default_rng(seed).uniform(-0.2, 0.2, (task.periods, len(low)))
     return middle + half * shake
 

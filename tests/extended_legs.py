@@ -47,7 +47,8 @@ def containing(rng: np.random.Generator) -> FiveBar:
 
 def narrow(rng: np.random.Generator) -> FiveBar:
     """Return a leg of two narrow rings, which cross in separate quadrangles."""
-    (a, b), (c, d) = rng.uniform(0.09, 0.11, 2), rng.uniform(0.01, 0.015, 2)
+    a, b = rng.uniform(0.09, 0.11, 2)
+    c, d = rng.uniform(0.01, 0.015, 2)
     return leg_of(rng, np.array([a, c, d, b]), rng.uniform(0.09, 0.12), float(c) * 0.5)
 
 
@@ -86,8 +87,10 @@ def search(leg: FiveBar, p: Array, inside: Bools, elbows: tuple[int, ...]) -> Ar
     """
     z = ((p - kinematics.bases(leg)[0]) @ [1.0, 1j]) * np.exp(-1j * leg.tilt)
     offset = complex(*leg.foot_offset)
-    low, high = abs(leg.L4 - leg.L3), leg.L4 + leg.L3
-    kappa, width = np.linspace(0.0, math.pi, 1001)[None, :], math.pi / 1000
+    low = abs(leg.L4 - leg.L3)
+    high = leg.L4 + leg.L3
+    kappa = np.linspace(0.0, math.pi, 1001)[None, :]
+    width = math.pi / 1000
     gap = leg.L1 + abs(offset) - np.abs(z)
     if leg.L1 != pytest.approx(abs(offset), rel=1e-9):
         gap = np.minimum(gap, np.abs(z) - abs(leg.L1 - abs(offset)))

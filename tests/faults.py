@@ -149,7 +149,9 @@ def on_the_floor(right: Callable[..., Array], scenario: Any, scene: Any, q: Arra
 
 
 LENGTHS = {name: 1.01 for name in ("L1", "L2", "L3", "L4", "L5", "L6")}
-ELLIPSE, EIGHT, TROT = "classic-ellipse", "extended-figure-eight", "treadmill-trot"
+ELLIPSE = "classic-ellipse"
+EIGHT = "extended-figure-eight"
+TROT = "treadmill-trot"
 
 MODEL = (
     Fault("kp of the motors 10 % low", "payload-ellipse", built(stronger(0.9))),

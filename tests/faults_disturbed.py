@@ -43,7 +43,8 @@ def in_the_model(plan: Plan) -> dict[str, Plan]:
 
 def in_time(plan: Plan) -> Plan:
     """Return a plan whose commands arrive a timestep late."""
-    scenario, servo = plan.scenario, plan.scenario.servo
+    scenario = plan.scenario
+    servo = plan.scenario.servo
     if plan.setpoints is not None:
         return plan._replace(setpoints=np.concatenate([plan.setpoints[:1], plan.setpoints[:-1]]))
     late = other(servo, delay=servo.delay + scenario.sim.timestep)

@@ -163,9 +163,13 @@ def backwards(right: Right, centre: Any, radii: Any, w: float, time: Any) -> Any
     return right(centre, (-radii[0], radii[1]), w, time)
 
 
-ELLIPSE, LOAD, SENSORS = "classic-ellipse", "payload-ellipse", "classic-pd-sensors"
+ELLIPSE = "classic-ellipse"
+LOAD = "payload-ellipse"
+SENSORS = "classic-pd-sensors"
 CIRCLE = "hobby-servo-circle"
-XL330, FORCE, LANDING = "q8bot-xl330", "extended-stance-force", "doggo-landing"
+XL330 = "q8bot-xl330"
+FORCE = "extended-stance-force"
+LANDING = "doggo-landing"
 
 PATHS = (
     Fault("ramp left out", ELLIPSE, around(base, "eased", at_once)),

@@ -28,7 +28,8 @@ SECONDS = 20.0
 """Processor time that one input may take [s]; most take a hundredth of one."""
 LINE = 1000
 """Characters that one clear line may have."""
-INPUTS, MINUTES = 100_000, 20.0
+INPUTS = 100_000
+MINUTES = 20.0
 """The long form of all tests together: it ends with whichever comes first."""
 SLOW = [HealthCheck.too_slow, HealthCheck.data_too_large, HealthCheck.filter_too_much]
 """What is no fault here: a simulation takes its time."""
@@ -45,7 +46,9 @@ class Bench:
         monkeypatch: pytest.MonkeyPatch,
         capture: pytest.CaptureFixture[str],
     ) -> None:
-        self.folder, self.capture, self.seen = folder, capture, Counter[str]()
+        self.folder = folder
+        self.capture = capture
+        self.seen = Counter[str]()
         self.last = Said(0, "", "")
         monkeypatch.chdir(folder)
         monkeypatch.setattr(scenario, "MOST_STEPS", STEPS)

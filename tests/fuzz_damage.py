@@ -35,8 +35,10 @@ class Damage(NamedTuple):
 @st.composite
 def damages(draw: st.DrawFn, contents: dict[str, bytes]) -> Damage:
     """Return a damage to a run directory whose files hold the given contents."""
-    file, how = draw(st.sampled_from(FILES)), draw(st.sampled_from(DAMAGE))
-    content, other = contents[file], draw(st.sampled_from([f for f in FILES if f != file]))
+    file = draw(st.sampled_from(FILES))
+    how = draw(st.sampled_from(DAMAGE))
+    content = contents[file]
+    other = draw(st.sampled_from([f for f in FILES if f != file]))
     if how == "bits":
         at = draw(st.one_of(st.integers(0, len(content) - 1), st.integers(1, 3000)))
         where = at if at < len(content) and draw(st.booleans()) else max(0, len(content) - at)

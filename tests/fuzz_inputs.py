@@ -257,7 +257,8 @@ def csvs(draw: st.DrawFn, header: str, content: bytes) -> bytes:
     """Return what may be a CSV of a path or of a force."""
     if draw(st.booleans()):
         return draw(mutated(content))
-    rows, time = [header], 0.0
+    rows = [header]
+    time = 0.0
     for _ in range(draw(st.integers(0, 8))):
         time += draw(st.sampled_from((0.05, 0.2, 0.7, 1e-9, 1e-300, 0.0, 1e5, -0.1)))
         near = draw(st.integers(0, 3)) > 0

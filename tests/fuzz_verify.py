@@ -46,14 +46,16 @@ def _no_constant(name: str) -> NoReturn:
 
 def _check_record(scenario: Scenario, record: Record) -> None:
     """Every step is there, at its time, finite, and the angles are those that the rates make."""
-    h, steps = scenario.sim.timestep, round(scenario.duration / scenario.sim.timestep)
+    h = scenario.sim.timestep
+    steps = round(scenario.duration / scenario.sim.timestep)
     for name, column in record.items():
         assert column.dtype == np.float64, name
         assert len(column) == steps, name
         assert np.isfinite(column).all(), name
     np.testing.assert_array_equal(record["time"], (np.arange(steps) + 1) * h)
     for joint in "ABED":
-        q, v = record[f"theta_{joint}"], record[f"theta_dot_{joint}"]
+        q = record[f"theta_{joint}"]
+        v = record[f"theta_dot_{joint}"]
         # semi-implicit: q+ = q + h v+; of the roundings, those of q are the largest
         room = 1e-12 * max(1.0, float(np.abs(q).max()))
         np.testing.assert_allclose(np.diff(q), h * v[1:], rtol=1e-9, atol=room)
@@ -61,10 +63,13 @@ def _check_record(scenario: Scenario, record: Record) -> None:
 
 def _points(scenario: Scenario, record: Record) -> dict[str, Array]:
     """Return A, B, D, E, both ends of C, and F as complex numbers x + i z."""
-    leg, angle = scenario.leg, {joint: record[f"theta_{joint}"] for joint in "ABED"}
+    leg = scenario.leg
+    angle = {joint: record[f"theta_{joint}"] for joint in "ABED"}
     E = 0.5 * leg.L5 * np.exp(1j * leg.tilt)
-    A, psi_2 = -E, angle["A"] + angle["B"]
-    B, D = A + leg.L1 * np.exp(1j * angle["A"]), E + leg.L4 * np.exp(1j * angle["E"])
+    A = -E
+    psi_2 = angle["A"] + angle["B"]
+    B = A + leg.L1 * np.exp(1j * angle["A"])
+    D = E + leg.L4 * np.exp(1j * angle["E"])
     left = B + leg.L2 * np.exp(1j * psi_2)
     right = D + leg.L3 * np.exp(1j * (angle["E"] + angle["D"]))
     F = left + leg.L6 * np.exp(1j * (psi_2 + leg.bend))
@@ -73,7 +78,8 @@ def _points(scenario: Scenario, record: Record) -> dict[str, Array]:
 
 def _check_closure(scenario: Scenario, record: Record) -> None:
     """Foot and gap are those of the angles."""
-    p, leg = _points(scenario, record), scenario.leg
+    p = _points(scenario, record)
+    leg = scenario.leg
     room = (
         1e-12
         * (leg.size + leg.L5)

@@ -85,7 +85,9 @@ def crossing(centre: complex, radius: float, other: complex, reach: float, side:
     Raises:
         ValueError: Unless |radius - reach| <= d <= radius + reach and d > 0.
     """
-    d, low, high = abs(other - centre), abs(radius - reach), radius + reach
+    d = abs(other - centre)
+    low = abs(radius - reach)
+    high = radius + reach
     if not (low <= d <= high and d > 0.0):
         raise ValueError(f"the circles never cross: d must be in [{low:g}, {high:g}] m, got {d:g}")
     a = (d * d + radius * radius - reach * reach) / (2.0 * d)
@@ -95,7 +97,8 @@ def crossing(centre: complex, radius: float, other: complex, reach: float, side:
 
 def pose(leg: Leg, foot: complex) -> list[float]:
     """Return psi [rad] in (-pi, pi] with the foot at x + 1j z [m]; out of reach as `crossing`."""
-    (L1, L2, L3, L4, _), (A, E) = leg.lengths, leg.motors
+    L1, L2, L3, L4, _ = leg.lengths
+    A, E = leg.motors
     B = crossing(A, L1, foot, abs(leg.foot_offset), leg.mode[0])
     along = (foot - B) / leg.foot_offset  # the frame of L2: as long as 1, to rounding
     C = B + L2 * along
@@ -105,15 +108,18 @@ def pose(leg: Leg, foot: complex) -> list[float]:
 
 def closed(leg: Leg, psi1: float, psi4: float) -> list[float]:
     """Return psi [rad] with the loop closed in the leg's assembly; an open one as `crossing`."""
-    (L1, L2, L3, L4, _), (A, E) = leg.lengths, leg.motors
-    B, D = A + cmath.rect(L1, psi1), E + cmath.rect(L4, psi4)
+    L1, L2, L3, L4, _ = leg.lengths
+    A, E = leg.motors
+    B = A + cmath.rect(L1, psi1)
+    D = E + cmath.rect(L4, psi4)
     C = crossing(B, L2, D, L3, leg.assembly)
     return [psi1, cmath.phase(C - B), cmath.phase(C - D), psi4]
 
 
 def assembly_of(leg: Leg, psi: Floats) -> int:
     """Return the sign of BDx BCz - BDz BCx."""
-    (L1, L2, _, L4, _), (A, E) = leg.lengths, leg.motors
+    L1, L2, _, L4, _ = leg.lengths
+    A, E = leg.motors
     BD = E + cmath.rect(L4, psi[3]) - A - cmath.rect(L1, psi[0])
     return 1 if (BD.conjugate() * cmath.rect(L2, psi[1])).imag > 0.0 else -1
 
@@ -135,7 +141,8 @@ def foot(leg: Leg, psi: Floats) -> tuple[complex, Arms]:
 def centres(leg: Leg, psi: Floats) -> list[tuple[complex, Arms]]:
     """Return base and arms of the four centres of mass [m]."""
     e1, e2, e3, e4 = (cmath.rect(1.0, angle) for angle in psi)
-    (c1, c2, c3, c4), (A, E) = leg.com, leg.motors
+    c1, c2, c3, c4 = leg.com
+    A, E = leg.motors
     return [
         (A, ((0, c1 * e1),)),
         (A, ((0, leg.lengths[0] * e1), (1, c2 * e2))),
@@ -161,9 +168,12 @@ def centripetal(arms: Arms, rates: Floats) -> complex:
 
 def jacobian(arms: Arms) -> list[list[float]]:
     """Return d p / d psi [m], rows x and z, four columns."""
-    x, z = [0.0] * 4, [0.0] * 4
+    x = [0.0] * 4
+    z = [0.0] * 4
     for k, r in arms:
-        x[k], z[k] = -r.imag, r.real  # 1j r
+        # 1j r
+        x[k] = -r.imag
+        z[k] = r.real
     return [x, z]
 
 
@@ -182,7 +192,8 @@ def mass_matrix(leg: Leg, psi: Floats) -> list[list[float]]:
 
 def bias(leg: Leg, psi: Floats, psi_dot: Floats, foot_force: complex = 0j) -> list[float]:
     """Return h = sum m J^T (J_dot psi_dot - g) - J_F^T F [N m] of the open tree, four numbers."""
-    h, loads = [0.0] * 4, [(foot(leg, psi)[1], -foot_force)]
+    h = [0.0] * 4
+    loads = [(foot(leg, psi)[1], -foot_force)]
     for m, (_, arms) in zip(leg.mass, centres(leg, psi), strict=True):
         loads.append((arms, m * (centripetal(arms, psi_dot) - leg.gravity)))
     for arms, force in loads:
@@ -233,10 +244,12 @@ def forward_dynamics(
 def angles_of(leg: Leg, p: complex, v: complex, a: complex) -> tuple[list[float], ...]:
     """Return psi, psi_dot, psi_ddot of one foot motion, given as x + 1j z; see `motion`."""
     psi = pose(leg, p)
-    arms, loop_arms = foot(leg, psi)[1], loop(leg, psi)[1]
+    arms = foot(leg, psi)[1]
+    loop_arms = loop(leg, psi)[1]
     J = jacobian(arms) + jacobian(loop_arms)
     psi_dot = np.linalg.solve(J, [v.real, v.imag, 0.0, 0.0]).tolist()
-    rest, gap = a - centripetal(arms, psi_dot), -centripetal(loop_arms, psi_dot)
+    rest = a - centripetal(arms, psi_dot)
+    gap = -centripetal(loop_arms, psi_dot)
     psi_ddot = np.linalg.solve(J, [rest.real, rest.imag, gap.real, gap.imag]).tolist()
     return psi, psi_dot, psi_ddot
 

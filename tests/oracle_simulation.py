@@ -208,12 +208,19 @@ def simulate(
 
 def _recorded(chain: _Chain, time: Array, states: Array) -> Motion:
     """Return everything a motion holds, from its states, shape (N, 4)."""
-    leg, springs = chain.leg, chain.springs
-    psi, psi_dot, foot, gap, tau, energy = [], [], [], [], [], []
+    leg = chain.leg
+    springs = chain.springs
+    psi = []
+    psi_dot = []
+    foot = []
+    gap = []
+    tau = []
+    energy = []
     for t, y in zip(time.tolist(), states.tolist(), strict=True):
         q = oracle.closed(leg, y[0], y[1])
         w = knee_rates(leg, q, y[2], y[3])
-        F, r = oracle.position(oracle.foot(leg, q)), oracle.position(oracle.loop(leg, q))
+        F = oracle.position(oracle.foot(leg, q))
+        r = oracle.position(oracle.loop(leg, q))
         psi.append(q)
         psi_dot.append(w)
         foot.append((F.real, F.imag))
@@ -248,16 +255,24 @@ def eased_ellipse(
         frequency: [Hz].
         ramp: T [s]; 0: in motion from the start.
     """
-    (cx, cz), (rx, rz), w, T = centre, radii, 2.0 * math.pi * frequency, ramp
+    cx, cz = centre
+    rx, rz = radii
+    w = 2.0 * math.pi * frequency
+    T = ramp
 
     def path(t: float) -> tuple[Pair, Pair, Pair]:
-        s, s1, s2 = t - T / 2, 1.0, 0.0
+        s = t - T / 2
+        s1 = 1.0
+        s2 = 0.0
         if t < T:
             k = t / T
             s = T * (5 * k**4 / 2 - 3 * k**5 + k**6)
             s1 = 10 * k**3 - 15 * k**4 + 6 * k**5
             s2 = (30 * k**2 - 60 * k**3 + 30 * k**4) / T
-        sin, cos, w1, w2 = math.sin(w * s), math.cos(w * s), w * s1, w * s2
+        sin = math.sin(w * s)
+        cos = math.cos(w * s)
+        w1 = w * s1
+        w2 = w * s2
         v = (rx * cos * w1, rz * sin * w1)
         a = (rx * (cos * w2 - sin * w1**2), rz * (sin * w2 + cos * w1**2))
         return (cx + rx * sin, cz - rz * cos), v, a

@@ -79,24 +79,33 @@ def forward_dynamics(
         psi_dot: Their rates [rad/s], which keep it closed (and the foot rolling, with grip).
         tau: Motor torques (tau_A, tau_E) [N m].
     """
-    S, mass, pull = np.zeros(4), ground.trunk + sum(leg.mass), 0.0
+    S = np.zeros(4)
+    mass = ground.trunk + sum(leg.mass)
+    pull = 0.0
     for m, (_, arms) in zip(leg.mass, oracle.centres(leg, psi), strict=True):
         S += m * np.array(oracle.jacobian(arms)[1])
         pull += m * oracle.centripetal(arms, psi_dot).imag
-    arms, tip = oracle.loop(leg, psi)[1], oracle.foot(leg, psi)[1]
-    (J_x, J_z), drift = oracle.jacobian(tip), oracle.centripetal(tip, psi_dot)
+    arms = oracle.loop(leg, psi)[1]
+    tip = oracle.foot(leg, psi)[1]
+    J_x, J_z = oracle.jacobian(tip)
+    drift = oracle.centripetal(tip, psi_dot)
     gap = oracle.centripetal(arms, psi_dot)
     J_x[1] += ground.radius
     held = [[*row, 0.0] for row in oracle.jacobian(arms)] + [[*J_z, 1.0]]
     still = [-gap.real, -gap.imag, -drift.imag]
     if ground.grips:
-        held, still = [*held, [*J_x, 0.0]], [*still, -drift.real]
+        held = [*held, [*J_x, 0.0]]
+        still = [*still, -drift.real]
 
     h = oracle.bias(leg, psi, psi_dot)
     n = 5 + len(held)
     K = np.zeros((n, n))
-    K[:4, :4], K[:4, 4], K[4, :4], K[4, 4] = oracle.mass_matrix(leg, psi), S, S, mass
-    K[5:, :5], K[:5, 5:] = held, -np.transpose(held)
+    K[:4, :4] = oracle.mass_matrix(leg, psi)
+    K[:4, 4] = S
+    K[4, :4] = S
+    K[4, 4] = mass
+    K[5:, :5] = held
+    K[:5, 5:] = -np.transpose(held)
     weight = mass * leg.gravity.imag - pull
     right = [tau[0] - h[0], -h[1], -h[2], tau[1] - h[3], weight, *still]
     found = np.linalg.solve(K, right).tolist()
@@ -140,7 +149,8 @@ def simulate(
             raise ValueError(f"the foot lifts off at t = {t:g} s: the ground does not pull")
         return [y[2], y[3], psi_ddot[0], psi_ddot[3]]
 
-    y0, span = [first[0], first[3], 0.0, 0.0], (0.0, float(times[-1]))
+    y0 = [first[0], first[3], 0.0, 0.0]
+    span = (0.0, float(times[-1]))
     result = solve_ivp(slope, span, y0, "LSODA", times, rtol=rtol, atol=atol)
     if not result.success:
         raise RuntimeError(result.message)
@@ -161,7 +171,9 @@ def _recorded(
     time: Array, theta: Array, rows: Array, first: list[float], leg: Leg, ground: Ground
 ) -> Stance:
     """Return everything a stance holds; rows are tau and `_row`, first is psi at t = 0."""
-    tau, foot, force = rows[:, :2], rows[:, 2:4], rows[:, 4:6]
+    tau = rows[:, :2]
+    foot = rows[:, 2:4]
+    force = rows[:, 4:6]
     anchor = oracle.position(oracle.foot(leg, first)).real + ground.radius * first[1]
     hip_z = ground.radius - foot[:, 1]
     return Stance(time, theta, foot, hip_z, tau, force, rows[:, 6], rows[:, 7] - anchor)
@@ -172,9 +184,11 @@ def _row(
 ) -> tuple[float, ...]:
     """Return foot x and z [m], ground force T and N [N], energy [J] and F_x + r psi_2 [m]."""
     point = oracle.foot(leg, psi)
-    F, force = oracle.position(point), forward_dynamics(leg, ground, psi, psi_dot, tau)[2]
+    F = oracle.position(point)
+    force = forward_dynamics(leg, ground, psi, psi_dot, tau)[2]
     # the leg seen from the floor: up by hip_z and at its rate
-    z, rate = ground.radius - F.imag, -oracle.velocity(point[1], psi_dot).imag
+    z = ground.radius - F.imag
+    rate = -oracle.velocity(point[1], psi_dot).imag
     momentum = sum(
         m * oracle.velocity(arms, psi_dot).imag
         for m, (_, arms) in zip(leg.mass, oracle.centres(leg, psi), strict=True)

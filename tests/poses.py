@@ -24,7 +24,8 @@ def random_leg(rng: np.random.Generator) -> FiveBar:
     """Return a leg of unequal links that can close; a third is coaxial, a third has no L6."""
     while True:
         L1, L2, L3, L4, L5, L6 = rng.uniform(0.02, 0.1, 6).tolist()
-        L5, L6 = L5 * float(rng.integers(3) > 0), L6 * float(rng.integers(3) > 0)
+        L5 = L5 * float(rng.integers(3) > 0)
+        L6 = L6 * float(rng.integers(3) > 0)
         if 2.0 * max(L1, L2, L3, L4, L5) < L1 + L2 + L3 + L4 + L5:
             bend, tilt = rng.uniform(-3.0, 3.0, 2).tolist()
             return FiveBar(L1, L2, L3, L4, L5, L6, bend, tilt)
@@ -53,10 +54,14 @@ def sample(
     foot = np.random.default_rng(1).uniform(-1.0, 1.0, (20_000, 2)) * leg.size
     theta = kinematics.inverse_all(leg, foot)[:, MODES.index(mode)]
     ok = np.isfinite(theta[:, 0])
-    foot, theta = foot[ok], theta[ok]
-    p, (A, E) = pose(leg, foot, theta), kinematics.bases(leg)
-    BC, DC = p.C_left - p.B, p.C_right - p.D
+    foot = foot[ok]
+    theta = theta[ok]
+    p = pose(leg, foot, theta)
+    A, E = kinematics.bases(leg)
+    BC = p.C_left - p.B
+    DC = p.C_right - p.D
     sines = np.min([sine(BC, DC), sine(p.B - A, foot - p.B), sine(p.D - E, DC)], axis=0)
     good = (sines > 0.4) & (kinematics.branch(leg, p).assembly == assembly)
-    rows, shape = np.flatnonzero(good)[: math.prod(batch)], (*batch, 2)
+    rows = np.flatnonzero(good)[: math.prod(batch)]
+    shape = (*batch, 2)
     return foot[rows].reshape(shape), theta[rows].reshape(shape)

@@ -37,8 +37,10 @@ Columns = dict[str, list[Any]]
 
 def ellipse(leg: FiveBar, steps: int, timestep: float = 0.001) -> Record:
     """Return the record of a foot that goes round an ellipse twice a second, all consistent."""
-    t, w = (np.arange(steps) + 1) * timestep, 4.0 * np.pi
-    c, s = np.cos(w * t), np.sin(w * t)
+    t = (np.arange(steps) + 1) * timestep
+    w = 4.0 * np.pi
+    c = np.cos(w * t)
+    s = np.sin(w * t)
     foot = np.stack([0.004 + 0.012 * s, -0.08 - 0.006 * c], axis=-1)
     foot_dot = w * np.stack([0.012 * c, 0.006 * s], axis=-1)
     foot_ddot = w**2 * np.stack([-0.012 * s, 0.006 * c], axis=-1)

@@ -56,7 +56,8 @@ class Shell:
     """Runs commands in a folder that holds short.toml, within this process."""
 
     def __init__(self, folder: Path, capture: pytest.CaptureFixture[str]) -> None:
-        self.folder, self.capture = folder, capture
+        self.folder = folder
+        self.capture = capture
 
     def __call__(self, *args: str) -> Said:
         """Return what a command came to."""

@@ -42,7 +42,8 @@ def assemblies(leg: FiveBar, foot: Array, mode: Mode) -> Array:
 @pytest.mark.parametrize("mode", MODES)
 def test_foot_and_angles_name_one_aspect(batch: tuple[int, ...], mode: Mode, assembly: int) -> None:
     foot, theta = sample(RIGID, batch, mode, assembly)
-    one, other = aspect_at(RIGID, foot, mode), aspect(RIGID, theta, assembly)
+    one = aspect_at(RIGID, foot, mode)
+    other = aspect(RIGID, theta, assembly)
     for each, again in zip(one, other, strict=True):
         np.testing.assert_array_equal(each, again)
         assert np.shape(each) == batch
@@ -62,7 +63,8 @@ def test_a_walk_that_meets_no_singularity_stays_in_its_aspect(
     for mode in MODES:
         found = assemblies(leg, walks, mode)
         clear = (found == found[:, :1]).all(axis=1) & (found[:, 0] != 0)
-        p, q = walks[clear, 0], walks[clear, -1]
+        p = walks[clear, 0]
+        q = walks[clear, -1]
         if clear.any():
             # too near a singularity for the grid: no number, so no aspect is said to be shared
             told = (aspect_at(leg, p, mode).part > 0) & (aspect_at(leg, q, mode).part > 0)
@@ -86,7 +88,8 @@ def test_parts_are_those_of_the_foot_plane(leg: FiveBar, mode: Mode) -> None:
     """Components of a fine grid of feet, a chart that the atlas has not; slivers left out."""
     line = np.linspace(-1.2, 1.2, 501) * leg.size
     foot = np.stack(np.meshgrid(line, line, indexing="ij"), axis=-1)
-    found, seen = assemblies(leg, foot, mode), []
+    found = assemblies(leg, foot, mode)
+    seen = []
     for assembly in (-1, 1):
         label = np.zeros(found.shape, dtype=int)
         count = int(ndimage.label(found == assembly, output=label))  # pyright: ignore[reportArgumentType]
@@ -170,7 +173,8 @@ def test_one_triple_two_aspects_in_one_workspace() -> None:
 
 
 def test_coaxial_leg_walks_all_around_its_motors() -> None:
-    p, q = 0.25 * unit(0.3), 0.25 * unit(np.linspace(-3.0, 3.0, 13))
+    p = 0.25 * unit(0.3)
+    q = 0.25 * unit(np.linspace(-3.0, 3.0, 13))
     assert same_aspect(COAXIAL, p, q, (-1, 1)).all()
     assert aspect_at(COAXIAL, q, (-1, 1)).part.tolist() == [1] * 13
 

@@ -50,7 +50,8 @@ def written(path: Path, change: dict[str, Any] | None = None) -> Path:
 
 
 def test_what_is_written_comes_back(tmp_path: Path) -> None:
-    path, recorded = tmp_path / "deep" / "x.json", baseline.record(METRICS)
+    path = tmp_path / "deep" / "x.json"
+    recorded = baseline.record(METRICS)
     assert baseline.read(path) is None
     baseline.write(path, recorded)
     assert baseline.read(path) == recorded

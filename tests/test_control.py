@@ -92,7 +92,8 @@ def test_servo_is_found() -> None:
 
 def test_servo_sends_the_angles_of_the_path_at_the_integrators_time() -> None:
     scenario = load()
-    leg, gains = scenario.leg, scenario.servo
+    leg = scenario.leg
+    gains = scenario.servo
     wanted = motion.plan(leg, scenario.path, 800, 0.001)
     q = wanted.q[:, [0, 2]]
     lead = gains.kd / gains.kp * np.diff(q, axis=0) / 0.001
@@ -110,7 +111,8 @@ def test_controller_of_another_package_drives_the_leg(plug: Plug) -> None:
     scenario = load("controller.name=ahead")
     assert isinstance(scenario.controller, control.Setpoints)
     assert scenario.table()["controller"] == {"name": "ahead", "lead": 0.0}
-    ours, theirs = rollout.run(load()), rollout.run(scenario)
+    ours = rollout.run(load())
+    theirs = rollout.run(scenario)
     np.testing.assert_array_equal(theirs.record["foot_x"], ours.record["foot_x"])
     lead = load("controller={name='ahead', lead=0.01}")
     assert msgspec.to_builtins(lead.controller) == {"lead": 0.01}

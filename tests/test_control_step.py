@@ -106,7 +106,8 @@ def test_noise_has_its_size_and_is_white() -> None:
 def test_noise_depends_on_the_seed_alone(seeds: tuple[int, ...]) -> None:
     sensors = Sensors(noise=0.01, rate_noise=3.0)
     theta, rate = moving(20, len(seeds))
-    theta, rate = np.tile(theta[:1], (len(seeds), 1, 1)), np.tile(rate[:1], (len(seeds), 1, 1))
+    theta = np.tile(theta[:1], (len(seeds), 1, 1))
+    rate = np.tile(rate[:1], (len(seeds), 1, 1))
     control = step(sensors=sensors, start=theta[:, 0], seeds=seeds)
     together = observed(control, theta, rate, 1)
     for row, seed in enumerate(seeds):

@@ -94,7 +94,8 @@ def test_controllers_are_found_and_are_feedback(name: str) -> None:
 def test_batch_is_one_by_one_to_the_last_bit(
     name: str, batch: tuple[int, ...], rng: np.random.Generator
 ) -> None:
-    law, (seen, wanted) = NAMES[name](), moving(RIGID, rng, batch)
+    law = NAMES[name]()
+    seen, wanted = moving(RIGID, rng, batch)
     tau = ask(law, RIGID, seen, wanted)
     assert tau.shape == (*batch, 2)
     assert np.all(np.abs(tau) > 0.0)
@@ -106,7 +107,8 @@ def test_batch_is_one_by_one_to_the_last_bit(
 
 @given(kp=gain, kd=gain, derivative=st.sampled_from(["measurement", "error"]))
 def test_pd_is_linear_in_its_gains(kp: float, kd: float, derivative: Any) -> None:
-    angle, rate = np.array([0.3, -0.2]), np.array([1.5, -4.0])
+    angle = np.array([0.3, -0.2])
+    rate = np.array([1.5, -4.0])
     wanted = at_rest(RIGID, HOME, foot=np.zeros(2))[1]._replace(theta_dot=np.array([2.0, 7.0]))
     seen = Observation(0.0, HOME - angle, rate)
     tau = ask(Pd(kp=kp, kd=kd, derivative=derivative), RIGID, seen, wanted)
@@ -122,7 +124,8 @@ def test_schedule_is_pd_at_both_ends_and_half_way(rng: np.random.Generator) -> N
     wanted = wanted._replace(foot=wanted.foot + away, theta=wanted.theta + 0.1)
     tau = ask(law, AIRHOCKEY, seen, wanted)
     s = np.array([0.0, 0.15625, 0.5, 1.0, 1.0])[:, None]  # 0.25^2 (3 - 0.5) = 0.15625
-    kp, kd = 90.0 - 80.0 * s, 2.0 - s
+    kp = 90.0 - 80.0 * s
+    kd = 2.0 - s
     np.testing.assert_allclose(tau, kp * 0.1 - kd * seen.theta_dot, rtol=0, atol=1e-12)
     near = Pd(kp=90.0, kd=2.0, derivative="error")
     np.testing.assert_array_equal(tau[0], ask(near, AIRHOCKEY, seen, wanted)[0])
@@ -134,7 +137,8 @@ def test_schedule_changes_its_gains_without_a_step_or_a_kink() -> None:
     seen, wanted = at_rest(AIRHOCKEY, np.broadcast_to(HOME, (401, 2)))
     foot = wanted.foot + np.stack([x, np.zeros(401)], axis=-1)
     kp = ask(law, AIRHOCKEY, seen, wanted._replace(foot=foot, theta=wanted.theta + 1.0))[:, 0]
-    slope, steps = np.diff(kp) / np.diff(x), 0.0005
+    slope = np.diff(kp) / np.diff(x)
+    steps = 0.0005
     assert np.all(slope < 1e-9)
     assert slope.min() == pytest.approx(-15.0, rel=1e-4)  # -3 / (2 blend), half way
     assert np.abs(np.diff(slope)).max() < 1.01 * steps * 600.0  # |kp''| <= 6 / blend^2
@@ -169,7 +173,8 @@ def test_impedance_does_the_work_of_its_spring(rng: np.random.Generator) -> None
     """At rest, without weight: tau . d theta = (stiffness (p* - p) - F*) . d foot."""
     leg = replace(RIGID, gravity=(0.0, 0.0))
     theta = sample(leg, ())[1]
-    offset, force = np.array([0.003, -0.002]), np.array([1.0, 2.0])
+    offset = np.array([0.003, -0.002])
+    force = np.array([1.0, 2.0])
     foot = kinematics.forward(leg, theta) + offset
     seen, wanted = at_rest(leg, theta, foot=foot, force=force)
     J = slopes(lambda q: kinematics.forward(leg, q), theta)
@@ -177,7 +182,8 @@ def test_impedance_does_the_work_of_its_spring(rng: np.random.Generator) -> None
     pull = np.array([100.0, 300.0]) * offset - force
     tau = ask(law, leg, seen, wanted)
     np.testing.assert_allclose(tau, J.T @ pull, rtol=1e-8)  # step^2 and eps / step
-    rate, foot_dot = rng.uniform(-1.0, 1.0, 2), np.array([0.3, -0.4])
+    rate = rng.uniform(-1.0, 1.0, 2)
+    foot_dot = np.array([0.3, -0.4])
     fast = ask(law, leg, seen._replace(theta_dot=rate), wanted._replace(foot_dot=foot_dot))
     damper = np.array([1.0, 2.0]) * (foot_dot - J @ rate)
     np.testing.assert_allclose(fast - tau, J.T @ damper, rtol=1e-7)
@@ -185,7 +191,8 @@ def test_impedance_does_the_work_of_its_spring(rng: np.random.Generator) -> None
 
 @pytest.mark.parametrize("law", [GravityCompensation(), Impedance()])
 def test_weight_is_carried_like_the_slope_of_its_energy(law: Law) -> None:
-    theta, force = sample(RIGID, ())[1], np.array([0.5, -2.0])
+    theta = sample(RIGID, ())[1]
+    force = np.array([0.5, -2.0])
     seen, wanted = at_rest(RIGID, theta, force=force, payload=0.2)
     weight = slopes(lambda q: dynamics.energy(RIGID, q, (0.0, 0.0), payload=0.2).potential, theta)
     J = slopes(lambda q: kinematics.forward(RIGID, q), theta)
@@ -208,7 +215,8 @@ def test_angles_that_cannot_close_are_far() -> None:
         kinematics.forward(RIGHT, theta)
     law = GainSchedule(blend=0.02)
     tau = ask(law, RIGHT, seen, wanted)
-    far, near = Pd(kp=law.kp_far, kd=law.kd_far), Pd(kp=law.kp_near, kd=law.kd_near)
+    far = Pd(kp=law.kp_far, kd=law.kd_far)
+    near = Pd(kp=law.kp_near, kd=law.kd_near)
     np.testing.assert_array_equal(tau[0, 0], ask(far, RIGHT, seen, wanted)[0, 0])
     np.testing.assert_array_equal(tau[0, 1], ask(near, RIGHT, seen, wanted)[0, 1])
     assert np.all((far.kp * 0.2 < tau[1, 1]) & (tau[1, 1] < near.kp * 0.2))

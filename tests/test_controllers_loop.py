@@ -23,8 +23,10 @@ from fivebar_sim.errors import DivergedError
 from fivebar_sim.geometry import FiveBar
 from fivebar_sim.paths import Circle
 
-AIRHOCKEY, EXTENDED = FiveBar.load("airhockey"), FiveBar.load("extended")
-CLASSIC, HOME = FiveBar.load("classic"), kinematics.home(AIRHOCKEY)[::2]
+AIRHOCKEY = FiveBar.load("airhockey")
+EXTENDED = FiveBar.load("extended")
+CLASSIC = FiveBar.load("classic")
+HOME = kinematics.home(AIRHOCKEY)[::2]
 STILL = np.zeros(2)
 Law = Pd | GainSchedule | ComputedTorque | Impedance | GravityCompensation
 Wanted = Callable[[float], Reference]
@@ -39,13 +41,16 @@ def sampled(
     leg: FiveBar, controller: Law, wanted: Wanted, theta: Array, time: float, rate: Any = STILL
 ) -> dynamics.Motion:
     """Return the motion of legs whose torques are held for the controller's period."""
-    T, q, w = controller.period, theta, np.broadcast_to(rate, theta.shape)
+    T = controller.period
+    q = theta
+    w = np.broadcast_to(rate, theta.shape)
     n = math.ceil(T / 0.002)
     rows = [(0.0, q, w)]
     for k in range(round(time / T)):
         tau = controller.command(leg, Servo(), Observation(k * T, q, w), wanted(k * T))
         hold = dynamics.simulate(leg, q, w, T / n, n, lambda t, q, w, tau=tau: tau)
-        q, w = hold.theta[-1], hold.theta_dot[-1]
+        q = hold.theta[-1]
+        w = hold.theta_dot[-1]
         rows.append(((k + 1) * T, q, w))
     time_, q, w = zip(*rows, strict=True)
     return dynamics.Motion(np.array(time_), np.array(q), np.array(w))
@@ -53,7 +58,8 @@ def sampled(
 
 def keep(leg: FiveBar, theta: Array, force: Any = STILL, payload: float = 0.0) -> Wanted:
     """Return the reference of legs that shall rest in a pose."""
-    zero, force = np.zeros_like(theta), np.broadcast_to(force, theta.shape)
+    zero = np.zeros_like(theta)
+    force = np.broadcast_to(force, theta.shape)
     foot = kinematics.forward(leg, theta)
     return lambda t: Reference(foot, zero, zero, theta, zero, zero, force, payload)
 
@@ -83,9 +89,13 @@ def misses(leg: FiveBar, motion: dynamics.Motion, wanted: Wanted) -> Array:
 
 def test_error_of_computed_torque_is_a_free_oscillator() -> None:
     """e_ddot + kd e_dot + kp e = 0, with a payload, a foot force, a motion and the full weight."""
-    leg, start, force = EXTENDED, kinematics.home(EXTENDED)[::2], np.array([0.5, -1.0])
-    e0, v0 = np.array([0.05, -0.03]), np.array([-0.4, 0.6])
-    z, w0 = 0.6, 20.0
+    leg = EXTENDED
+    start = kinematics.home(EXTENDED)[::2]
+    force = np.array([0.5, -1.0])
+    e0 = np.array([0.05, -0.03])
+    v0 = np.array([-0.4, 0.6])
+    z = 0.6
+    w0 = 20.0
 
     def wanted(t: float) -> Reference:
         theta = start + 0.1 * np.sin([5.0 * t, 7.0 * t])
@@ -93,7 +103,8 @@ def test_error_of_computed_torque_is_a_free_oscillator() -> None:
         return Reference(STILL, STILL, STILL, theta, rate, (start - theta) * [25, 49], force, 0.05)
 
     law = law_of(leg, ComputedTorque(kp=w0**2, kd=2 * z * w0), wanted)
-    first, t = wanted(0.0), np.linspace(0.0, 0.5, 51)
+    first = wanted(0.0)
+    t = np.linspace(0.0, 0.5, 51)
     motion = dynamics.integrate(
         leg, first.theta - e0, first.theta_dot - v0, t, law,
         foot_force=lambda t, q, w: force, payload=0.05,
@@ -108,7 +119,8 @@ def test_error_of_computed_torque_is_a_free_oscillator() -> None:
 def test_impedance_gives_way_by_the_force_over_the_stiffness() -> None:
     """Under its weight and more than the expected force, from the target to rest."""
     theta = kinematics.inverse(CLASSIC, (0.005, -0.075))
-    expected, real = np.array([0.2, 0.5]), np.array([0.5, 0.9])
+    expected = np.array([0.2, 0.5])
+    real = np.array([0.5, 0.9])
     law = Impedance(stiffness=(150.0, 250.0), damping=(3.0, 3.0))
     wanted = keep(CLASSIC, theta, expected)
     motion = dynamics.simulate(
@@ -124,7 +136,8 @@ def test_impedance_gives_way_by_the_force_over_the_stiffness() -> None:
 def test_leg_without_weight_floats() -> None:
     """It rests where it is; in motion it keeps its kinetic energy, or gives it to the damping."""
     theta = sample(EXTENDED, (5,))[1]
-    free, drag = GravityCompensation(), GravityCompensation(kd=1e-3)
+    free = GravityCompensation()
+    drag = GravityCompensation(kd=1e-3)
     rest = sampled(EXTENDED, free, keep(EXTENDED, theta), theta, 0.05)
     np.testing.assert_allclose(rest.theta - theta, 0.0, rtol=0, atol=1e-12)
     ends = []
@@ -152,7 +165,8 @@ def test_held_torque_is_stable_between_the_two_bounds(T: float) -> None:
     """Between kp T / 2 and 2 m / T, m the least eigenvalue of M; computed torque has m = 1."""
     m = float(np.linalg.eigvalsh(dynamics.mass_matrix(AIRHOCKEY, HOME))[0])
     for law, m_ in ((Pd, m), (ComputedTorque, 1.0)):
-        top, kp = 2.0 * m_ / T, 0.1 * m_ / T**2
+        top = 2.0 * m_ / T
+        kp = 0.1 * m_ / T**2
         assert growth(AIRHOCKEY, law(kp=kp, kd=0.95 * top, period=T), 60) < 0.1
         assert growth(AIRHOCKEY, law(kp=kp, kd=1.05 * top, period=T), 60) > 10.0
         kd = 0.2 * m_ / T
@@ -187,7 +201,8 @@ def test_schedule_reaches_far_targets_that_its_near_gains_alone_do_not() -> None
     theta = kinematics.inverse(AIRHOCKEY, feet)
     theta = HOME + (theta - HOME + np.pi) % (2.0 * np.pi) - np.pi
     pairs = np.array([(i, j) for i in range(7) for j in range(7) if i != j])
-    starts, goal = theta[pairs[:, 0]], keep(AIRHOCKEY, theta[pairs[:, 1]])
+    starts = theta[pairs[:, 0]]
+    goal = keep(AIRHOCKEY, theta[pairs[:, 1]])
     motion = sampled(AIRHOCKEY, GainSchedule(), goal, starts, 0.6)
     assert misses(AIRHOCKEY, motion, goal)[0].min() > 0.1
     assert misses(AIRHOCKEY, motion, goal)[40:].max() < 0.005
@@ -199,7 +214,8 @@ def test_schedule_reaches_far_targets_that_its_near_gains_alone_do_not() -> None
 
 def test_mass_error_leaves_a_bounded_error() -> None:
     """At rest -mass_error M^-1 weight / ((1 + mass_error) kp); in motion more, yet stable."""
-    theta, law = kinematics.inverse(CLASSIC, (0.005, -0.075)), ComputedTorque(mass_error=0.2)
+    theta = kinematics.inverse(CLASSIC, (0.005, -0.075))
+    law = ComputedTorque(mass_error=0.2)
     motion = sampled(CLASSIC, law, keep(CLASSIC, theta), theta, 0.6)  # slowest: 35 / s
     end = motion.theta[-1]
     pull = np.linalg.solve(dynamics.mass_matrix(CLASSIC, end), dynamics.bias(CLASSIC, end, STILL))

@@ -89,7 +89,8 @@ def wrong(script: dict[str, Any], tmp_path: Path):
     def check(text: str, *, long: bool = False) -> list[str]:
         folder = tmp_path / "page"
         folder.mkdir()
-        page, found = script["Page"](text, folder, long=long), []
+        page = script["Page"](text, folder, long=long)
+        found = []
         page.lay()
         for item in page.items:
             try:
@@ -126,7 +127,8 @@ def test_numbers_as_close_as_they_are_shown(
 
 
 def test_lines_in_order(script: dict[str, Any]) -> None:
-    compare, error = script["compare_lines"], script["WrongError"]
+    compare = script["compare_lines"]
+    error = script["WrongError"]
     compare(" tracking RMS  1.192 mm  <= 1.3 mm  pass\n branch flips 0", PRINTED)
     compare("tracking RMS ... pass", PRINTED)
     for lines in (
@@ -142,7 +144,8 @@ def test_lines_in_order(script: dict[str, Any]) -> None:
 
 
 def test_values_of_a_paragraph(script: dict[str, Any]) -> None:
-    compare, error = script["compare_values"], script["WrongError"]
+    compare = script["compare_values"]
+    error = script["WrongError"]
     compare("tracking RMS: 1.19 mm; 1.566 mm", "It is 1.19 mm, at\nmost 1.566 mm.", PRINTED)
     for values, text in (
         ("tracking RMS: 1.19 mm", "It is 1.20 mm."),  # the paragraph says another

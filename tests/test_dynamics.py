@@ -76,7 +76,9 @@ def test_equation_of_motion_holds_together(
     leg: FiveBar, batch: tuple[int, ...], rng: np.random.Generator
 ) -> None:
     theta = poses(leg, batch)
-    w, alpha, F = rates(rng, theta), 50.0 * rates(rng, theta), rates(rng, theta)
+    w = rates(rng, theta)
+    alpha = 50.0 * rates(rng, theta)
+    F = rates(rng, theta)
     M = dynamics.mass_matrix(leg, theta, payload=LOAD)
     assert M.shape == (*batch, 2, 2)
     np.testing.assert_array_equal(M, np.swapaxes(M, -1, -2))
@@ -125,8 +127,11 @@ def test_payload_is_the_force_that_its_mass_exerts(leg: FiveBar, rng: np.random.
 
 @EACH
 def test_energy_grows_by_the_power_put_in(leg: FiveBar, rng: np.random.Generator) -> None:
-    theta, h = poses(leg, (30,)), 1e-6
-    w, alpha, F = rates(rng, theta), 50.0 * rates(rng, theta), rates(rng, theta)
+    theta = poses(leg, (30,))
+    h = 1e-6
+    w = rates(rng, theta)
+    alpha = 50.0 * rates(rng, theta)
+    F = rates(rng, theta)
     tau = dynamics.inverse(leg, theta, w, alpha, F, payload=LOAD)
     power = np.sum(tau * w, -1) + np.sum(F * times(kinematics.jacobian(leg, theta), w), -1)
     energies = [
@@ -140,7 +145,9 @@ def test_energy_grows_by_the_power_put_in(leg: FiveBar, rng: np.random.Generator
 
 @EACH
 def test_weight_is_the_slope_of_the_potential_energy(leg: FiveBar) -> None:
-    theta, h, rest = poses(leg, (30,)), 1e-5, (0.0, 0.0)
+    theta = poses(leg, (30,))
+    h = 1e-5
+    rest = (0.0, 0.0)
     slopes = [
         (up.potential - down.potential) / (2.0 * h)
         for up, down in (
@@ -167,7 +174,8 @@ def test_torques_and_energy_are_the_oracles(leg: FiveBar, rng: np.random.Generat
     psi, psi_dot, _ = oracle.motion(truth, foot, v, a)
     pushed = dynamics.forward(leg, theta, w, 0.1 * F, F)
     for i in range(len(foot)):
-        angles, speeds = psi[i].tolist(), psi_dot[i].tolist()
+        angles = psi[i].tolist()
+        speeds = psi_dot[i].tolist()
         alphas, _ = oracle.forward_dynamics(truth, angles, speeds, 0.1 * F[i], complex(*F[i]))
         assert worst(pushed[i], np.array(alphas)[[0, 3]]) < 1e-10
         total = sum(dynamics.energy(leg, theta[i], w[i]))
@@ -187,7 +195,9 @@ def test_torques_are_mujocos_with_the_loop_eliminated(
     data = mujoco.MjData(mj)
     tau = dynamics.inverse(leg, *at_motors(motion), F)
     for i in range(len(foot)):
-        data.qpos, data.qvel, data.qacc = motion.q[i], motion.q_dot[i], motion.q_ddot[i]
+        data.qpos = motion.q[i]
+        data.qvel = motion.q_dot[i]
+        data.qacc = motion.q_ddot[i]
         mujoco.mj_inverse(mj, data)
         left, right, tip = (site_jacobian(mj, data, name) for name in ("C_left", "C_right", "foot"))
         # open tree: f = (tau_A, 0, tau_E, 0) + loop^T lambda + tip^T F
@@ -238,7 +248,8 @@ def test_leg_of_nothing_is_felt_as_its_payload() -> None:
 
 def test_coaxial_leg_turned_as_a_whole_is_a_rigid_body() -> None:
     leg = replace(PRESETS["minitaur"], gravity=(0.0, 0.0))
-    theta, w = poses(leg, (20,)), (7.0, 7.0)
+    theta = poses(leg, (20,))
+    w = (7.0, 7.0)
     np.testing.assert_allclose(dynamics.bias(leg, theta, w).sum(-1), 0.0, rtol=0, atol=1e-13)
     turned = dynamics.energy(leg, theta + 0.4, w)
     np.testing.assert_allclose(turned.kinetic, dynamics.energy(leg, theta, w).kinetic, rtol=1e-12)
@@ -247,7 +258,8 @@ def test_coaxial_leg_turned_as_a_whole_is_a_rigid_body() -> None:
 def test_assembly_and_its_mirror_image() -> None:
     other = replace(HEAVY, assembly=1)
     theta = poses(other, (10,))
-    given, F = (theta, theta, theta), (1.0, 2.0)
+    given = (theta, theta, theta)
+    F = (1.0, 2.0)
     found = dynamics.inverse(HEAVY, *given, F, assembly=1)
     np.testing.assert_array_equal(found, dynamics.inverse(other, *given, F))
     assert (np.abs(found - dynamics.inverse(HEAVY, *given, F)) > 1e-3).any()
@@ -270,7 +282,8 @@ def test_straight_sides_move_but_resist_without_limit() -> None:
 
 
 def test_singular_and_open_poses_name_the_first_index() -> None:
-    theta, still = [(math.pi - 0.5, 0.5), IN_LINE], (0.0, 0.0)
+    theta = [(math.pi - 0.5, 0.5), IN_LINE]
+    still = (0.0, 0.0)
     for ask in (dynamics.mass_matrix, dynamics.reflected_inertia):
         with pytest.raises(SingularError, match="1 of 2 poses are singular: B, C and D") as info:
             ask(LINE, theta)
@@ -281,7 +294,9 @@ def test_singular_and_open_poses_name_the_first_index() -> None:
 
 
 def test_bad_arguments_are_refused() -> None:
-    theta, still, bad = poses(HEAVY, ()), (0.0, 0.0), (0.0, math.nan)
+    theta = poses(HEAVY, ())
+    still = (0.0, 0.0)
+    bad = (0.0, math.nan)
     asks: list[tuple[str, Callable[[], object]]] = [
         ("theta must be finite", lambda: dynamics.mass_matrix(HEAVY, bad)),
         ("theta_dot must be finite", lambda: dynamics.bias(HEAVY, theta, bad)),

@@ -18,7 +18,8 @@ FRICTION = 0.3
 
 def motions(rng: np.random.Generator) -> tuple[Array, Array, Array]:
     theta = sample(RIGID, (40,))[1]
-    w, alpha = rng.uniform(-20.0, 20.0, theta.shape), rng.uniform(-900.0, 900.0, theta.shape)
+    w = rng.uniform(-20.0, 20.0, theta.shape)
+    alpha = rng.uniform(-900.0, 900.0, theta.shape)
     w[::4, 0] = 0.0
     return theta, w, alpha
 
@@ -50,7 +51,8 @@ def test_forward_undoes_inverse(rng: np.random.Generator) -> None:
 
 @pytest.mark.parametrize("friction", [-1.0, math.nan, math.inf])
 def test_bad_friction_is_refused(friction: float) -> None:
-    theta, still = sample(RIGID, ())[1], (0.0, 0.0)
+    theta = sample(RIGID, ())[1]
+    still = (0.0, 0.0)
     for ask in (dynamics.inverse, dynamics.forward):
         with pytest.raises(ArgumentError, match=r"friction must be in \[0, inf\) N m, got"):
             ask(RIGID, theta, still, still, friction=friction)

@@ -71,7 +71,8 @@ def planned(leg: FiveBar) -> Array:
 @pytest.mark.parametrize("assembly", [-1, 1])
 def test_assembly_that_is_asked_for_is_that_of_a_leg_of_it(assembly: int) -> None:
     own, other = (replace(HEAVY, assembly=sign * assembly) for sign in (1, -1))
-    mine, asked = answers(own, own), answers(other, own, assembly=assembly)
+    mine = answers(own, own)
+    asked = answers(other, own, assembly=assembly)
     for name, values in mine.items():
         for value, same in zip(values, asked[name], strict=True):
             np.testing.assert_array_equal(same, value, err_msg=name)
@@ -83,7 +84,8 @@ def test_assembly_that_is_asked_for_is_that_of_a_leg_of_it(assembly: int) -> Non
 
 def test_what_is_left_out_is_nothing() -> None:
     theta, w, alpha, _ = state(HEAVY)
-    bare, told = answers(HEAVY, HEAVY), answers(HEAVY, HEAVY, payload=0.0)
+    bare = answers(HEAVY, HEAVY)
+    told = answers(HEAVY, HEAVY, payload=0.0)
     for name, values in bare.items():
         for value, same in zip(values, told[name], strict=True):
             np.testing.assert_array_equal(value, same, err_msg=name)
@@ -113,7 +115,9 @@ def test_payload_is_a_point_of_L2s_own_mass(payload: float) -> None:
     assert PLAIN.mass is not None
     assert PLAIN.com is not None
     assert PLAIN.inertia is not None
-    m, c, inertia = PLAIN.mass[1], PLAIN.com[1], PLAIN.inertia[1]
+    m = PLAIN.mass[1]
+    c = PLAIN.com[1]
+    inertia = PLAIN.inertia[1]
     both = m + payload
     apart = PLAIN.L2 - c
     loaded = replace(
@@ -122,7 +126,8 @@ def test_payload_is_a_point_of_L2s_own_mass(payload: float) -> None:
         com=(PLAIN.com[0], c + payload * apart / both, *PLAIN.com[2:]),
         inertia=(PLAIN.inertia[0], inertia + m * payload / both * apart**2, *PLAIN.inertia[2:]),
     )
-    carried, own = answers(PLAIN, PLAIN, payload=payload), answers(loaded, PLAIN)
+    carried = answers(PLAIN, PLAIN, payload=payload)
+    own = answers(loaded, PLAIN)
     for name, values in own.items():
         for value, same in zip(values, carried[name], strict=True):
             np.testing.assert_allclose(
@@ -148,12 +153,17 @@ def test_gap_of_a_soft_loop_obeys_its_equation(leg: FiveBar, damping: float) -> 
     rate = np.diff(q, axis=0, prepend=q[:1]) / H  # of the step that ends in each row
     k, b = pull(H)
     mj = model.build(leg)
-    data, M, D = mujoco.MjData(mj), np.zeros((4, 4)), np.diag([damping, 0.0, damping, 0.0])
+    data = mujoco.MjData(mj)
+    M = np.zeros((4, 4))
+    D = np.diag([damping, 0.0, damping, 0.0])
     sites = [mj.site(name).id for name in ("C_left", "C_right")]
-    left, parts = [], []
+    left = []
+    parts = []
     for row in range(len(q) - 1):
-        v, alpha = rate[row], (rate[row + 1] - rate[row]) / H
-        data.qpos[:], data.qvel[:] = q[row], v
+        v = rate[row]
+        alpha = (rate[row + 1] - rate[row]) / H
+        data.qpos[:] = q[row]
+        data.qvel[:] = v
         mujoco.mj_forward(mj, data)
         mujoco.mj_fullM(mj, data, M)
         J = np.zeros((2, 3, 4))
@@ -173,7 +183,8 @@ def test_gap_of_a_soft_loop_obeys_its_equation(leg: FiveBar, damping: float) -> 
 
 
 def test_soft_loop_stays_closer_with_less_damping_and_opens_by_it() -> None:
-    q, gaps = planned(CLASSIC), []
+    q = planned(CLASSIC)
+    gaps = []
     for damping in (0.0, 0.01, 0.02):
         p = kinematics.chain_points(CLASSIC, dynamics.soft_loop(CLASSIC, q, H, damping))
         gaps.append(p.C_left - p.C_right)
@@ -187,7 +198,8 @@ def test_soft_loop_stays_closer_with_less_damping_and_opens_by_it() -> None:
 
 def test_coarse_break_down_is_where_the_fine_one_is() -> None:
     """Free knees fly until B, C and D are in line, at some time between 10 and 100 ms."""
-    theta, apart = kinematics.inverse(CLASSIC, (0.005, -0.078)), (40.0, -40.0)
+    theta = kinematics.inverse(CLASSIC, (0.005, -0.078))
+    apart = (40.0, -40.0)
     ends = [
         broken(lambda: dynamics.integrate(CLASSIC, theta, apart, (0.0, 1.0), rtol=1e-6, atol=1e-6)),
         broken(lambda: dynamics.simulate(CLASSIC, theta, apart, 1e-3, 1000)),
@@ -227,7 +239,8 @@ def test_one_motor_of_one_leg_that_turns_too_far_ends_all(rates: tuple[float, fl
 
 
 def test_law_without_a_number_at_the_start_ends_the_motion_there() -> None:
-    theta, nothing = kinematics.home(CLASSIC)[::2], np.full(2, np.nan)
+    theta = kinematics.home(CLASSIC)[::2]
+    nothing = np.full(2, np.nan)
     with pytest.raises(DivergedError, match="down at t = 3 s: torque is not finite") as info:
         dynamics.integrate(CLASSIC, theta, (0.0, 0.0), (3.0, 4.0), lambda t, q, w: nothing)
     assert info.value.time == 3.0
@@ -238,8 +251,10 @@ def test_law_without_a_number_at_the_start_ends_the_motion_there() -> None:
 
 def test_steps_without_finite_accelerations_are_refused_without_a_warning() -> None:
     rest = kinematics.home(CLASSIC)
-    far, jump = np.tile(rest, (3, 1)), np.tile(rest, (6, 1))
-    far[1], far[2] = 100.0, 300.0
+    far = np.tile(rest, (3, 1))
+    jump = np.tile(rest, (6, 1))
+    far[1] = 100.0
+    far[2] = 300.0
     jump[3, 1] = 1e200
     for q, h in ((far, 1e-307), (jump, 1e-150)):
         with pytest.raises(ArgumentError, match=f"q must have finite acc.* timestep of {h!r} s"):
@@ -247,7 +262,8 @@ def test_steps_without_finite_accelerations_are_refused_without_a_warning() -> N
 
 
 def test_steps_arguments_are_named_with_their_units() -> None:
-    q, one = np.tile(kinematics.home(CLASSIC), (4, 1)), (1.0, 2.0)
+    q = np.tile(kinematics.home(CLASSIC), (4, 1))
+    one = (1.0, 2.0)
     asks: list[tuple[str, Callable[[], object]]] = [
         (r"foot_force must have shape", lambda: dynamics.step_torques(CLASSIC, q, H, (1.0,))),
         (
@@ -285,7 +301,8 @@ def test_rates_beyond_all_floats_are_a_break_down_and_no_warning() -> None:
 
 
 def test_whole_seconds_and_the_ends_of_tolerances() -> None:
-    floating, theta = replace(CLASSIC, gravity=(0.0, 0.0)), kinematics.home(CLASSIC)[::2]
+    floating = replace(CLASSIC, gravity=(0.0, 0.0))
+    theta = kinematics.home(CLASSIC)[::2]
     rest = dynamics.integrate(floating, theta, (0, 0), (0, 1, 2), rtol=1.0, atol=1.0)
     assert rest.time.dtype == np.float64
     np.testing.assert_array_equal(rest.theta, np.tile(theta, (3, 1)))

@@ -50,9 +50,12 @@ def test_springs_keep_the_energy_for_ten_seconds() -> None:
 
 def test_foot_force_and_torque_do_the_work() -> None:
     """Over 50 ms; the work by Simpson's rule on the same rows, error h^4 P'''' / 180 of each."""
-    h, load, leg = 1e-4, 0.1, FiveBar.load("extended")
+    h = 1e-4
+    load = 0.1
+    leg = FiveBar.load("extended")
     theta = kinematics.home(leg)[::2]
-    force, torque = np.array([0.2, 0.5]), np.array([0.004, -0.003])
+    force = np.array([0.2, 0.5])
+    torque = np.array([0.004, -0.003])
     motion = dynamics.simulate(
         leg, theta, STILL, h, 500, lambda t, q, w: torque * math.cos(40.0 * t),
         foot_force=lambda t, q, w: force, payload=load,
@@ -117,7 +120,8 @@ def test_batch_is_a_plain_loop_to_the_last_bit(
 
 
 def test_balanced_leg_stays() -> None:
-    theta, hold = SLACK, dynamics.bias(LEG, SLACK, STILL)
+    theta = SLACK
+    hold = dynamics.bias(LEG, SLACK, STILL)
     motion = dynamics.simulate(LEG, theta, STILL, 1e-3, 20, lambda t, q, w: hold)
     np.testing.assert_allclose(motion.theta, np.broadcast_to(theta, (21, 2)), rtol=0, atol=1e-14)
 
@@ -155,7 +159,8 @@ def test_step_that_is_far_too_long_is_refused() -> None:
 
 
 def test_start_that_cannot_be_keeps_its_own_error() -> None:
-    line, law = FiveBar(0.25, 0.5, 0.5, 0.25, 0.5), springs
+    line = FiveBar(0.25, 0.5, 0.5, 0.25, 0.5)
+    law = springs
     asks: list[Callable[[FiveBar, tuple[float, float]], Any]] = [
         lambda leg, theta: dynamics.simulate(leg, theta, STILL, 1e-3, 3, law),
         lambda leg, theta: dynamics.integrate(leg, theta, STILL, (0.0, 1.0), law),
@@ -185,7 +190,8 @@ def test_bad_arguments_are_refused() -> None:
     def many(t: float, theta: Array, theta_dot: Array) -> Array:
         return np.zeros((5, 2))
 
-    simulate, integrate = dynamics.simulate, dynamics.integrate
+    simulate = dynamics.simulate
+    integrate = dynamics.integrate
     asks: list[tuple[str, Ask]] = [
         ("timestep must be in", lambda: simulate(LEG, START, STILL, 0.0, 3)),
         ("timestep must be in", lambda: simulate(LEG, START, STILL, math.nan, 3)),

@@ -36,7 +36,8 @@ def planned(h: float, duration: float = 0.5) -> Motion:
 def open_rows(leg: FiveBar, rng: np.random.Generator, h: float, batch: tuple[int, ...]) -> Array:
     """Return three rows each of motions near the rest pose that do not keep the loop closed."""
     q = kinematics.home(leg) + rng.uniform(-0.2, 0.2, (*batch, 4))
-    v, a = rng.uniform(-5.0, 5.0, q.shape), rng.uniform(-50.0, 50.0, q.shape)
+    v = rng.uniform(-5.0, 5.0, q.shape)
+    a = rng.uniform(-50.0, 50.0, q.shape)
     return np.stack([q - h * v, q, q + h * (v + h * a)], axis=-2)
 
 
@@ -53,7 +54,8 @@ def open_rows(leg: FiveBar, rng: np.random.Generator, h: float, batch: tuple[int
 def test_short_steps_take_the_torque_of_the_continuous_motion(
     frequency: float, payload: float, friction: float, force: tuple[float, float]
 ) -> None:
-    path, errors = ellipse(frequency), []
+    path = ellipse(frequency)
+    errors = []
     for h in (2e-4, 1e-4):
         m = motion.plan(LEG, path, round(0.3 / h), h)
         tau = dynamics.step_torques(LEG, m.q, h, force, payload=payload, friction=friction)
@@ -91,7 +93,9 @@ def test_left_side_of_a_soft_loop_keeps_its_motion_and_the_right_trails(
 
 @pytest.mark.parametrize("leg", LEGS.values(), ids=LEGS)
 def test_torques_are_those_of_mujocos_open_tree(leg: FiveBar, rng: np.random.Generator) -> None:
-    h, friction, F = 0.1, 0.2, np.array([1.5, -4.0])
+    h = 0.1
+    friction = 0.2
+    F = np.array([1.5, -4.0])
     rows = open_rows(leg, rng, h, (20,))
     tau = dynamics.step_torques(leg, rows, h, F, friction=friction)[:, 1]
     v, v_next = (np.diff(rows, axis=1) / h).swapaxes(0, 1)
@@ -100,7 +104,9 @@ def test_torques_are_those_of_mujocos_open_tree(leg: FiveBar, rng: np.random.Gen
     mj.opt.disableflags |= off.mjDSBL_CONSTRAINT | off.mjDSBL_ACTUATION | off.mjDSBL_DAMPER
     data = mujoco.MjData(mj)
     for i in range(len(rows)):
-        data.qpos, data.qvel, data.qacc = rows[i, 1], v[i], (v_next[i] - v[i]) / h
+        data.qpos = rows[i, 1]
+        data.qvel = v[i]
+        data.qacc = (v_next[i] - v[i]) / h
         mujoco.mj_inverse(mj, data)
         left, right, tip = (site_jacobian(mj, data, name) for name in ("C_left", "C_right", "foot"))
         columns = np.column_stack([*np.eye(4)[::2], *(left - right)])
@@ -130,7 +136,8 @@ def test_pull_of_the_loop_is_mujocos(h: float) -> None:
 
 @pytest.mark.parametrize("batch", BATCHES)
 def test_batch_is_a_plain_loop(batch: tuple[int, ...], rng: np.random.Generator) -> None:
-    h, rows = 0.1, open_rows(RIGID, rng, 0.1, batch)
+    h = 0.1
+    rows = open_rows(RIGID, rng, 0.1, batch)
     tau = dynamics.step_torques(RIGID, rows, h)
     assert tau.shape == (*batch, 2, 2)
     for index in np.ndindex(batch):

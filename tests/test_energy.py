@@ -57,7 +57,8 @@ def test_energies_are_mujocos(preset: str, rng: np.random.Generator) -> None:
         built.opt.enableflags |= mujoco.mjtEnableBit.mjENBL_ENERGY
         payload = scene.mass if isinstance(scene, Payload) else 0.0
         trunk = scene.mass if isinstance(scene, Ground) else 0.0
-        body, data = Body(leg, payload, trunk), mujoco.MjData(built)
+        body = Body(leg, payload, trunk)
+        data = mujoco.MjData(built)
         potential = []
         for _ in range(6):
             data.qpos[:] = rng.uniform(-3.0, 3.0, built.nq)
@@ -74,7 +75,9 @@ def test_energies_are_mujocos(preset: str, rng: np.random.Generator) -> None:
 
 def test_foot_rates_are_the_slope_of_the_foot(rng: np.random.Generator) -> None:
     leg = FiveBar.load("extended")
-    q, v, step = rng.uniform(-3, 3, (50, 4)), rng.uniform(-5, 5, (50, 4)), 1e-6
+    q = rng.uniform(-3, 3, (50, 4))
+    v = rng.uniform(-5, 5, (50, 4))
+    step = 1e-6
     ahead, back = (kinematics.chain_points(leg, q + s * step * v).F for s in (1, -1))
     np.testing.assert_allclose(energy.foot_rates(leg, q, v), (ahead - back) / (2 * step), atol=1e-8)
 

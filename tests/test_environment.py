@@ -101,8 +101,10 @@ def test_all_is_as_in_gymnasium(kind: str, action: str) -> None:
         "randomise": Randomise(length=(0.97, 1.03), kp=(0.8, 1.2), delay=(0.0, 0.01)),
         "model_seed": 4,
     }
-    env, other = environment.load(kind, seed=5, **options), LegEnv(kind, **options)
-    step, (observation, _) = env.reset(), other.reset(seed=5)
+    env = environment.load(kind, seed=5, **options)
+    other = LegEnv(kind, **options)
+    step = env.reset()
+    observation, _ = other.reset(seed=5)
     random = np.random.default_rng(1)
     for _ in range(100):
         chosen = random.uniform(other.episodes.low, other.episodes.high)
@@ -145,7 +147,8 @@ def test_foot_is_that_of_qpos_not_of_the_step_before() -> None:
     env = environment.load("track", seed=0)
     env.reset()
     step = env.step(0.5 * (env.action_spec().minimum + env.action_spec().maximum))
-    leg, q = env.task.episodes.task.leg, env.physics.data.qpos
+    leg = env.task.episodes.task.leg
+    q = env.physics.data.qpos
     np.testing.assert_array_equal(
         step.observation["foot"], kinematics.chain_points(leg, np.array(q)).F
     )

@@ -137,7 +137,9 @@ def test_other_rounding_is_no_alarm(
 ) -> None:
     """Every command, and the start, off by 1e-14: no metric uses a thousandth of its tolerance."""
     scenario = Scenario.load(name)
-    right, advance, begin = rollout.run(scenario).metrics, Legs.advance, Legs.__init__
+    right = rollout.run(scenario).metrics
+    advance = Legs.advance
+    begin = Legs.__init__
     monkeypatch.setattr(Legs, "advance", lambda legs, ctrl: advance(legs, off(ctrl, rng)))
     monkeypatch.setattr(
         Legs, "__init__", lambda legs, m, q, *rest: begin(legs, m, off(q, rng), *rest)
@@ -146,7 +148,8 @@ def test_other_rounding_is_no_alarm(
         metrics = rollout.run(scenario).metrics
         assert metrics != right
         for key, each in baseline.record(right).metrics.items():
-            then, now = look_up(right, key), look_up(metrics, key)
+            then = look_up(right, key)
+            now = look_up(metrics, key)
             assert (then is None) == (now is None), key
             if then is not None and now is not None:
                 assert abs(now - then) <= 1e-3 * each.tolerance, key

@@ -162,7 +162,8 @@ def test_legs_of_several_periods_and_kinds_come_back_in_order() -> None:
 def test_commands_hold_for_a_control_period(every: int) -> None:
     """Also in the last one, which 400 steps cut off where seven do not divide them."""
     plan = with_mine(Angles(period=every * H))
-    sent, k = ctrl(plan), np.arange(400)
+    sent = ctrl(plan)
+    k = np.arange(400)
     wanted = plan.motion.q[:, [0, 2]]
     np.testing.assert_array_equal(sent, wanted[k // every * every])
 
@@ -188,7 +189,8 @@ def test_unsaturated_torque_arrives_though_the_motor_has_a_back_emf(integrator: 
         plan = planned(*settings, f"controller.period={h}", f"sim.integrator={integrator}")
         record = rollout.execute(plan).record
         for side in "AE":
-            torque, rate = record[f"torque_{side}"], record[f"theta_dot_{side}"]
+            torque = record[f"torque_{side}"]
+            rate = record[f"theta_dot_{side}"]
             before = np.concatenate([[0.0], rate[:-1]])
             command = record[f"ctrl_{side}"] - 1.0 / 200.0 * before
             np.testing.assert_allclose(torque, command - (rate - before) / 200.0, atol=1e-15)
@@ -204,7 +206,8 @@ def test_saturated_torque_is_that_of_the_motors_line() -> None:
     result = rollout.execute(plan)
     assert result.metrics["load"]["saturated"]["A"] > 0.1
     for side in "AE":
-        rate, u = result.record[f"theta_dot_{side}"], result.record[f"ctrl_{side}"]
+        rate = result.record[f"theta_dot_{side}"]
+        u = result.record[f"ctrl_{side}"]
         line = np.clip(u, -0.003, 0.003) - 0.003 / 30.0 * rate
         np.testing.assert_allclose(result.record[f"torque_{side}"], line, atol=1e-15)
 

@@ -168,7 +168,8 @@ def test_gear_friction_is_overcome(integrator: Integrator, bar: float) -> None:
 @EACH
 def test_simulated_joints_are_the_planned_ones(integrator: Integrator) -> None:
     """All four, also where the loop of implicitfast is open by 75 um, 1 mrad of the right side."""
-    h, servo = 1e-3, Servo()
+    h = 1e-3
+    servo = Servo()
     m = motion.plan(CLASSIC, ellipse(), 1250, h)
     wanted = m.q
     if integrator == "implicitfast":

@@ -59,7 +59,8 @@ def test_follow_is_a_plain_loop_of_the_nearest_solutions(rng: np.random.Generato
     for _ in range(5):
         path = rng.uniform(-1.0, 1.0, (300, 2)) * RIGID.size  # no walk: to meet all choices
         path = path[np.isfinite(kinematics.inverse_all(RIGID, path)).any(axis=(-1, -2))]
-        loop, now = [], rng.uniform(-5.0, 5.0, 2)
+        loop = []
+        now = rng.uniform(-5.0, 5.0, 2)
         for foot in path:
             now = kinematics.inverse_nearest(RIGID, foot, now)
             loop.append(now)
@@ -77,7 +78,8 @@ def test_report_is_a_scan_of_the_distances() -> None:
     report = path_report(CLASSIC, ELLIPSE, time)
     d = distances_at(CLASSIC, ELLIPSE)
     for name in d._fields:
-        each, closest = getattr(d, name), getattr(report, name)
+        each = getattr(d, name)
+        closest = getattr(report, name)
         np.testing.assert_array_equal(getattr(report.distances, name), each)
         worst = min(range(len(each)), key=lambda i, each=each: abs(each[i]))
         assert closest == (each[worst], time[worst], worst, math.inf)
@@ -102,7 +104,8 @@ def test_from_the_edge_of_reach_the_leg_goes_on_in_the_nearest_mode(
     sweep: float, s_A: int, s_E: int
 ) -> None:
     """theta_A = alpha + s_A beta, alpha ~ sweep t, beta ~ 0.35 |t|: s_A is against the sweep."""
-    foot, goes = through_the_edge(sweep), -int(np.sign(sweep))
+    foot = through_the_edge(sweep)
+    goes = -int(np.sign(sweep))
     came = follow(CLASSIC, foot, kinematics.inverse(CLASSIC, foot[0], (s_A, s_E)))
     assert came.mode[:200].tolist() == [[s_A, s_E]] * 200
     assert came.mode[201:].tolist() == [[goes, s_E]] * 200
@@ -139,7 +142,8 @@ def test_path_through_the_flat_loop_is_timed_between_its_points() -> None:
         theta = kinematics.inverse(leg, (0.0, z))
         return float(kinematics.knees(leg, theta)[0][1]) - z
 
-    low, high = -0.04, -0.0266
+    low = -0.04
+    high = -0.0266
     assert height(low) * height(high) < 0.0
     for _ in range(60):
         middle = 0.5 * (low + high)

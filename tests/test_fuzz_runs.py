@@ -52,7 +52,8 @@ def _restore(place: Path) -> None:
 
 def _damaged(place: Path, damage: Damage) -> None:
     """Do to a run directory what a damage says."""
-    file, other = place / damage.file, place / damage.other
+    file = place / damage.file
+    other = place / damage.other
     if damage.how == "swapped":
         file.write_bytes(contents()[damage.other])
         other.write_bytes(contents()[damage.file])
@@ -101,7 +102,8 @@ def _check_record(place: Path) -> None:
 
 
 def any_report(bench: Bench, damage: Damage) -> None:
-    place, page = bench.folder / "mine", bench.folder / "page.html"
+    place = bench.folder / "mine"
+    page = bench.folder / "page.html"
     _restore(place)
     _damaged(place, damage)
     said = bench.lawful("report", "mine", "--out", "page.html", "--quiet")

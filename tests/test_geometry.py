@@ -30,7 +30,8 @@ def integrated(*bodies: tuple[tuple[float, float], tuple[float, float], float]) 
     p = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2)
     cells = np.zeros(len(p))
     for start, end, r in bodies:
-        a, b = np.subtract(p, start), np.subtract(end, start)
+        a = np.subtract(p, start)
+        b = np.subtract(end, start)
         along = np.clip((a @ b) / max(float(b @ b), 1e-300), 0.0, 1.0)
         d2 = np.sum((a - along[:, None] * b) ** 2, axis=-1)
         cells += 2.0 * np.sqrt(np.maximum(r * r - d2, 0.0)) * h**2
@@ -99,7 +100,9 @@ def test_classic_masses_by_hand() -> None:
     assert L1.mass == pytest.approx(1200 * math.pi * 16e-6 * (0.04 + 0.016 / 3), rel=1e-14)
     assert [round(1e3 * m, 2) for m in (L1.mass, L3.mass, L2.mass - L3.mass)] == [2.73, 3.94, 1.09]
     assert (L1, L1.com, L3.com) == (L4, (0.02, 0.0), (0.03, 0.0))
-    foot, d = L2.mass - L3.mass, 0.03  # parallel axes, by the reduced mass
+    # parallel axes, by the reduced mass
+    foot = L2.mass - L3.mass
+    d = 0.03
     reduced = foot * L3.mass / L2.mass
     assert L2.inertia == pytest.approx(
         L3.inertia + 0.4 * foot * 0.006**2 + reduced * d**2, rel=1e-13

@@ -77,10 +77,12 @@ def test_momentum_of_the_whole_leg_asks_for_the_recorded_force(scene: str, integ
     """In every step, (M (v+ - v) / h + bias) along hip_z is what the ground pushed in that step."""
     plan, result = done(f"scene={scene}", *HOLD, f"sim.integrator={integrator}", "duration=0.4")
     q, v = states(plan, result)
-    data, M = mujoco.MjData(plan.model), np.zeros((5, 5))
+    data = mujoco.MjData(plan.model)
+    M = np.zeros((5, 5))
     needed = np.empty(len(q) - 1)
     for k in range(len(needed)):
-        data.qpos[:], data.qvel[:] = q[k], v[k]
+        data.qpos[:] = q[k]
+        data.qvel[:] = v[k]
         mujoco.mj_forward(plan.model, data)
         mujoco.mj_fullM(plan.model, data, M)
         needed[k] = (M @ (v[k + 1] - v[k]) / H + data.qfrc_bias)[0]
@@ -97,7 +99,8 @@ def test_dropped_leg_falls_freely(drop: float, integrator: str) -> None:
     """hip_z = z_0 - g t^2 / 2, with a step's error g h t / 2; it meets the floor when it must."""
     scene = f"scene={{kind='rail', drop={drop}}}"
     plan, result = done(scene, *HOLD, f"sim.integrator={integrator}", "duration=0.4")
-    record, t = result.record, result.record["time"]
+    record = result.record
+    t = result.record["time"]
     falls = int(np.argmax(record["ground_z"] > 0.0))
     assert plan.start[0] == pytest.approx(drop + LEG.foot_radius + 0.07, abs=1e-15)
     z = plan.start[0] - 0.5 * 9.81 * t * (t + H)
@@ -113,16 +116,20 @@ def test_slid_is_the_way_of_the_contact_point() -> None:
     """Against MuJoCo's own contact: its point on L2, its velocity, and that of the belt."""
     plan, result = done("scene={kind='treadmill', speed=0.15}", *BACK, "duration=1.0")
     q, v = states(plan, result)
-    data, speeds = mujoco.MjData(plan.model), np.full(len(q), np.nan)
-    jacobian, body = np.zeros((3, 5)), plan.model.body("L2").id
+    data = mujoco.MjData(plan.model)
+    speeds = np.full(len(q), np.nan)
+    jacobian = np.zeros((3, 5))
+    body = plan.model.body("L2").id
     for k in range(len(q)):
-        data.qpos[:], data.qvel[:] = q[k], v[k]
+        data.qpos[:] = q[k]
+        data.qvel[:] = v[k]
         mujoco.mj_forward(plan.model, data)
         if data.ncon == 1:
             mujoco.mj_jac(plan.model, data, jacobian, None, data.contact[0].pos, body)
             speeds[k] = (jacobian @ v[k])[0] + 0.15
     # the step from row k to k + 1 is v of its end times h; the record begins at k = 1
-    way, ours = H * speeds[2:], ground.slid(LEG, result.record)
+    way = H * speeds[2:]
+    ours = ground.slid(LEG, result.record)
     sees = np.isfinite(way)
     assert sees.sum() > 700
     assert np.abs(ours[sees]).sum() > 1e-2
@@ -136,7 +143,8 @@ def test_planted_foot_goes_with_the_belt() -> None:
     _, result = done(
         "scene={kind='treadmill', friction=3.0}", *BACK, "controller.feedforward=velocity"
     )
-    record, stance = result.record, slice(100, 340)
+    record = result.record
+    stance = slice(100, 340)
     assert ground.stands(record)[stance].all()
     way = np.diff(record["belt_x"])[stance].sum()
     assert way == pytest.approx(-0.24 * 0.02 / 0.7)
@@ -156,7 +164,8 @@ def test_belt_under_a_held_foot_slips_by_its_way(speed: float) -> None:
         "servo.kp=50",
         "servo.kd=0.5",
     )
-    record, steady = result.record, slice(500, 1500)
+    record = result.record
+    steady = slice(500, 1500)
     share = ground.stands(record)[steady].mean()
     assert share > 0.8
     np.testing.assert_allclose(record["belt_x"], -speed * record["time"], atol=1e-15)

@@ -103,7 +103,8 @@ def test_each_turns_the_verdict_and_says_when(
 def test_time_is_that_of_the_first_step_past_the_bound() -> None:
     result = ran("rail-landing", "scene.drop=1.0", "duration=1.2")
     guard = tripped(result)["ground"]
-    record, leg = result.record, result.scenario.leg
+    record = result.record
+    leg = result.scenario.leg
     depth = leg.foot_radius - record["hip_z"] - record["foot_z"]
     assert guard.high == 2.0 * leg.foot_radius
     assert guard.value == pytest.approx(depth.max(), rel=1e-12)
@@ -146,7 +147,8 @@ def test_chatter_is_up_and_down_with_every_command_and_lasts(rng: np.random.Gene
     """3 s at 1 ms, a command every 10 ms: of A, while E does as the motion asks for."""
     time = np.arange(1.0, 3001.0) * 1e-3
     command = np.arange(3000) // 10
-    turning, load = np.where(command % 2, 1.0, -1.0), np.sin(2.0 * np.pi * 2.0 * time)
+    turning = np.where(command % 2, 1.0, -1.0)
+    load = np.sin(2.0 * np.pi * 2.0 * time)
 
     def most(torque: Array) -> float:
         record = {"time": time, "torque_A": torque, "torque_E": load}

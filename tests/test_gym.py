@@ -147,7 +147,8 @@ def test_observation_is_the_state() -> None:
     env = LegEnv("hop")
     env.reset(seed=0)
     observation = env.step(env.action_space.sample())[0]
-    q, v = env.episodes.qpos[0], env.episodes.qvel[0]
+    q = env.episodes.qpos[0]
+    v = env.episodes.qvel[0]
     seen = {name: observation[where] for name, where in env.layout.items()}
     np.testing.assert_array_equal(seen["theta"], q[[1, 3]])
     np.testing.assert_array_equal(seen["theta_dot"], v[[1, 3]])
@@ -159,7 +160,8 @@ def test_observation_is_the_state() -> None:
 
 
 def test_sensors_are_seen_late_and_noisy() -> None:
-    exact, late = LegEnv("track"), LegEnv("track", sensors=Sensors(delay=0.005))
+    exact = LegEnv("track")
+    late = LegEnv("track", sensors=Sensors(delay=0.005))
     noisy = LegEnv("track", sensors=Sensors(noise=0.01))
     seen = {}
     for name, env in (("exact", exact), ("late", late), ("noisy", noisy)):
@@ -180,7 +182,8 @@ def test_the_loop_is_ended_with_its_reason() -> None:
     env.reset(seed=0)
     ends = set()
     random = np.random.default_rng(0)
-    low, high = env.episodes.low, env.episodes.high
+    low = env.episodes.low
+    high = env.episodes.high
     for _ in range(20):
         env.reset()
         for _ in range(100):

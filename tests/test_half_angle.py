@@ -54,19 +54,23 @@ def bound(leg: FiveBar, foot: Array, theta: Array) -> Array:
 
 def test_two_routes_agree_over_a_million_points() -> None:
     """1000 legs, 1000 points each, all four modes; 1.2 10^6 poses are reachable."""
-    rng, seen, worst = np.random.default_rng(5), 0, 0.0
+    rng = np.random.default_rng(5)
+    seen = 0
+    worst = 0.0
     for _ in range(1000):
         leg = random_leg(rng)
         foot = rng.uniform(-1.0, 1.0, (1000, 2)) * leg.size
         every = kinematics.inverse_all(leg, foot)
         for k, mode in enumerate(MODES):
             ok = np.isfinite(every[:, k, 0])
-            p, theta = foot[ok], every[ok, k]
+            p = foot[ok]
+            theta = every[ok, k]
             other = kinematics.inverse_half_angle(leg, p, mode)
             assert ((-np.pi < other) & (other <= np.pi)).all()
             error = np.abs(wrap(other - theta))
             assert (error <= bound(leg, p, theta)).all()
-            worst, seen = max(worst, float(error.max(initial=0.0))), seen + int(ok.sum())
+            worst = max(worst, float(error.max(initial=0.0)))
+            seen = seen + int(ok.sum())
             count = f"^{1000 - ok.sum()} of 1000 points"
             with pytest.raises(UnreachableError, match=count):
                 kinematics.inverse_half_angle(leg, foot, mode)
@@ -76,7 +80,9 @@ def test_two_routes_agree_over_a_million_points() -> None:
 
 def test_two_routes_agree_near_full_stretch_and_fold() -> None:
     """There the angle is known to the root of rounding: 3e-8 rad; 1e-10 from 1e-11 of d inwards."""
-    rng, worst, far_off = np.random.default_rng(6), 0.0, 0
+    rng = np.random.default_rng(6)
+    worst = 0.0
+    far_off = 0
     for _ in range(500):
         near, far, L5 = rng.uniform(0.02, 0.1, 3)
         u = EPS * (near + far + L5) ** 2
@@ -89,7 +95,8 @@ def test_two_routes_agree_near_full_stretch_and_fold() -> None:
                         f(r, near, far, s) for f in (side_angle, half_angle)
                     )
                     np.testing.assert_array_equal(ok, also)
-                    error, limit = np.abs(wrap(alpha - theta)), side_bound(r, near, far, u)
+                    error = np.abs(wrap(alpha - theta))
+                    limit = side_bound(r, near, far, u)
                     assert (error[ok] <= limit[ok]).all()
                     worst = max(worst, float(error[ok].max()))
                     far_off += int((error[ok] > 1e-10).sum())
@@ -118,7 +125,9 @@ def test_batch_is_a_plain_loop_to_the_last_bit(batch: tuple[int, ...]) -> None:
 @pytest.mark.parametrize(("x", "z"), [(-0.25, -0.5), (-0.25, 0.5)])
 def test_a_plus_c_zero_has_one_knee_at_half_a_turn(x: float, z: float) -> None:
     """|AB| = 1/4, |BC| = 1/2, in numbers without rounding: a + c = -1/8 + 1/8."""
-    r, near, far = np.array([x, z]), 0.25, 0.5
+    r = np.array([x, z])
+    near = 0.25
+    far = 0.5
     s = 1 if z > 0.0 else -1  # which knee is straight to the left
     assert principal(half_angle(r, near, far, s)[0]) == math.pi
     other = half_angle(r, near, far, -s)[0]  # 0 / 0 in the published form
@@ -192,7 +201,8 @@ def test_principal_angles() -> None:
 
 
 FAR = np.full((2, 3, 2), [0.0, -0.04])
-FAR[1, 0], FAR[1, 2] = (0.0, -0.5), (np.nan, 0.0)
+FAR[1, 0] = (0.0, -0.5)
+FAR[1, 2] = (np.nan, 0.0)
 
 
 @pytest.mark.parametrize("leg", [RIGHT, RIGID], ids=["plain", "extended"])
@@ -214,7 +224,8 @@ def test_refusals_are_those_of_inverse(leg: FiveBar, foot: Any, mode: Any) -> No
 
 def test_within_is_the_first_mode_within() -> None:
     """Against a plain loop over points, modes and turns."""
-    rng, seen = np.random.default_rng(8), np.zeros(5, dtype=int)
+    rng = np.random.default_rng(8)
+    seen = np.zeros(5, dtype=int)
     for _ in range(1000):
         leg = random_leg(rng)
         foot = rng.uniform(-1.0, 1.0, 2) * leg.size
@@ -245,7 +256,9 @@ def test_published_limits_pick_the_knees_outwards_of_an_upright_leg() -> None:
 
 
 def test_limits_are_closed_and_kept_to_rounding_and_fewest_turns_are_taken() -> None:
-    foot, a = (0.0, -0.04), math.atan2(4.0, 3.0)  # angles (-2a or 0, pi or 2a - pi)
+    # angles (-2a or 0, pi or 2a - pi)
+    foot = (0.0, -0.04)
+    a = math.atan2(4.0, 3.0)
     for turn in (-2.0 * math.pi, 0.0, 4.0 * math.pi):
         limits = ((turn, turn), (turn + 3.0, turn + math.pi))
         theta = kinematics.inverse_within(RIGHT, foot, limits)
@@ -259,7 +272,8 @@ def test_within_names_the_limit() -> None:
     foot = np.full((2, 2, 2), [0.0, -0.04])
     foot[1, 0] = (0.0, -0.06)
     angle = kinematics.inverse_all(RIGHT, foot[0, 0])
-    A, E = (float(angle[0, 0]),) * 2, (float(angle[0, 1]),) * 2
+    A = (float(angle[0, 0]),) * 2
+    E = (float(angle[0, 1]),) * 2
     for limits, side, unnamed in (((A, (-4.0, 4.0)), "A", "E"), (((-4.0, 4.0), E), "E", "A")):
         with pytest.raises(
             UnreachableError, match=rf"^1 of 4 .*theta_{side} must be in .*deg\), got .* or"
@@ -281,7 +295,8 @@ def test_within_refuses_what_no_mode_reaches_and_only_that() -> None:
     assert info.value.index == (1, 0)
     foot = np.random.default_rng(9).uniform(-0.15, 0.15, (1000, 2))
     found = np.isfinite(kinematics.inverse_all(RIGID, foot)[..., 0])
-    some, own = found.any(axis=-1), found[:, MODES.index(RIGID.mode)]
+    some = found.any(axis=-1)
+    own = found[:, MODES.index(RIGID.mode)]
     others = foot[some & ~own]  # with L6 > 0 reach depends on the mode
     kinematics.inverse_within(RIGID, others, WIDE)
     mixed = np.concatenate([others, foot[~some]])

@@ -32,7 +32,8 @@ HIPS = [kind(RIGID, *offset) for kind in (SideStep, Steering) for offset in OFFS
 
 def in_plane(h: Hip, foot: Array) -> Array:
     """Return planar feet in the body frame, phi = 0."""
-    x, z = foot[..., 0], foot[..., 1]
+    x = foot[..., 0]
+    z = foot[..., 1]
     if isinstance(h, SideStep):
         return np.stack([x, np.full_like(x, h.across), z + h.along], axis=-1)
     return np.stack([x + h.along, np.full_like(x, h.across), z], axis=-1)
@@ -65,7 +66,9 @@ def test_round_trips_over_full_circles(kind: type[SideStep] | type[Steering]) ->
     The foot comes back from everywhere on the circle; the hip angle to eps across / u, and all
     angles to 1e-12 away from u = 0.
     """
-    rng, seen, signs = np.random.default_rng(3), np.zeros((4, 2, 2), dtype=int), (-1, 1)
+    rng = np.random.default_rng(3)
+    seen = np.zeros((4, 2, 2), dtype=int)
+    signs = (-1, 1)
     for k in range(100):
         leg = random_leg(rng)
         h = kind(leg, *(rng.uniform(-0.03, 0.03, 2) * (k % 3 > 0)).tolist())
@@ -73,17 +76,22 @@ def test_round_trips_over_full_circles(kind: type[SideStep] | type[Steering]) ->
         every = kinematics.inverse_all(leg, planar)
         for j, mode in enumerate(MODES):
             found = np.isfinite(every[:, j, 0])
-            F, theta = planar[found], every[found, j]
-            p, (A, E) = pose(leg, F, theta), kinematics.bases(leg)
-            BC, DC = p.C_left - p.B, p.C_right - p.D
+            F = planar[found]
+            theta = every[found, j]
+            p = pose(leg, F, theta)
+            A, E = kinematics.bases(leg)
+            BC = p.C_left - p.B
+            DC = p.C_right - p.D
             good = np.min([sine(BC, DC), sine(p.B - A, F - p.B), sine(p.D - E, DC)], axis=0) > 0.05
-            u, assembly = stretched(h, F), kinematics.branch(leg, p).assembly
+            u = stretched(h, F)
+            assembly = kinematics.branch(leg, p).assembly
             for a, s in np.ndindex(2, 2):
                 this = good & (assembly == signs[a]) & (np.sign(u) == signs[s])
                 theta3 = np.column_stack([full_circle(int(this.sum())), theta[this]])
                 foot = hip.forward(h, theta3, signs[a])
                 again = hip.inverse(h, foot, mode, signs[s])
-                error, v = np.abs(wrap(again - theta3)), np.abs(u[this])
+                error = np.abs(wrap(again - theta3))
+                v = np.abs(u[this])
                 assert ((-np.pi < again) & (again <= np.pi)).all()
                 assert (error[:, 0] <= 8.0 * EPS * (1.0 + abs(h.across) / v)).all()
                 assert (error[v > 0.05 * leg.size] <= 1e-12).all()
@@ -125,7 +133,8 @@ def test_hip_is_singular_where_the_foot_is_on_its_cylinder(h: Hip) -> None:
 @pytest.mark.parametrize("batch", BATCHES)
 @pytest.mark.parametrize("assembly", [-1, 1])
 def test_jacobian_is_the_slope_of_forward(h: Hip, batch: tuple[int, ...], assembly: int) -> None:
-    theta, step = sample(RIGID, batch, (-1, 1), assembly)[1], 3e-6
+    theta = sample(RIGID, batch, (-1, 1), assembly)[1]
+    step = 3e-6
     theta3 = np.concatenate([full_circle(*batch)[..., None], theta], axis=-1)
     slopes = [
         hip.forward(h, theta3 + step * e, assembly) - hip.forward(h, theta3 - step * e, assembly)
@@ -144,7 +153,8 @@ def test_jacobian_is_the_slope_of_forward(h: Hip, batch: tuple[int, ...], assemb
 @pytest.mark.parametrize("h", HIPS)
 @pytest.mark.parametrize("batch", BATCHES)
 def test_forward_is_a_rotation_of_the_planar_leg(h: Hip, batch: tuple[int, ...]) -> None:
-    (foot, theta), phi = sample(RIGID, batch), full_circle(*batch)
+    foot, theta = sample(RIGID, batch)
+    phi = full_circle(*batch)
     theta3 = np.concatenate([phi[..., None], theta], axis=-1)
     expected = rotated(h, in_plane(h, foot), phi)
     np.testing.assert_allclose(hip.forward(h, theta3), expected, rtol=0, atol=1e-15)
@@ -154,7 +164,8 @@ def test_batch_is_a_plain_loop_to_the_last_bit() -> None:
     foot, theta = sample(RIGID, (60,))
     theta3 = np.column_stack([full_circle(60), theta])
     for h in HIPS:
-        P, side = hip.forward(h, theta3), np.where(stretched(h, foot) < 0.0, -1, 1)
+        P = hip.forward(h, theta3)
+        side = np.where(stretched(h, foot) < 0.0, -1, 1)
         loops = [
             (hip.forward(h, t), hip.jacobian(h, t), hip.inverse(h, p, side=s))
             for t, p, s in zip(theta3, P, side, strict=True)
@@ -213,7 +224,8 @@ def test_foot_on_the_cylinder_has_one_solution(across: float) -> None:
 
 @pytest.mark.parametrize("zero", [0.0, -0.0])
 def test_half_a_turn_is_plus_pi(zero: float) -> None:
-    above, rounded = (0.0, zero, 0.04), (0.0, -1e-20, 0.04)
+    above = (0.0, zero, 0.04)
+    rounded = (0.0, -1e-20, 0.04)
     np.testing.assert_array_equal(hip.leg_plane(SideStep(RIGHT), [above, rounded]).phi, np.pi)
     assert hip.inverse(Steering(RIGHT, along=0.05), (-0.05, zero, -0.04))[0] == np.pi
     coaxial = SideStep(FiveBar(0.25, 0.5, 0.5, 0.25, 0.0))  # stretched to the back
@@ -244,7 +256,8 @@ def test_side_may_differ_from_point_to_point() -> None:
     ],
 )
 def test_out_of_reach(P: tuple[float, float, float], message: str) -> None:
-    h, good = SideStep(RIGHT, -0.03), (0.0, -0.03, -0.04)
+    h = SideStep(RIGHT, -0.03)
+    good = (0.0, -0.03, -0.04)
     with pytest.raises(UnreachableError, match=message):
         hip.inverse(h, P)
     batch = np.array([[good, good], [good, P], [(0.0, 0.0, 0.0), (0.0, 0.0, -9.0)]])
@@ -278,7 +291,8 @@ def test_wrong_shapes_are_refused(bad: Any) -> None:
 
 
 def test_wrong_arguments_are_refused() -> None:
-    h, P = SideStep(RIGHT), (0.0, 0.0, -0.04)
+    h = SideStep(RIGHT)
+    P = (0.0, 0.0, -0.04)
     for side in (0, 2, math.nan, "left", [1, -1]):
         with pytest.raises(ArgumentError, match="side must be -1 or 1"):
             hip.inverse(h, P, side=cast(Any, side))

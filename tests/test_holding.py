@@ -38,7 +38,8 @@ def accepted(limit: float, *settings: str) -> bool:
 
 def least(*settings: str) -> float:
     """Return the least limit that is accepted [N m], by bisection."""
-    low, high = 1e-6, 10.0
+    low = 1e-6
+    high = 10.0
     assert not accepted(low, *settings)
     assert accepted(high, *settings)
     while high - low > 1e-6 * high:
@@ -53,7 +54,8 @@ def weight(trunk: float) -> float:
 
 def standing(x: float, trunk: float, friction: float) -> float:
     """Return the least greater torque that holds the trunk, over all pulls of the floor [N m]."""
-    theta, most = kinematics.inverse(LEG, [x, -0.07]), friction * weight(trunk)
+    theta = kinematics.inverse(LEG, [x, -0.07])
+    most = friction * weight(trunk)
     pulls: Array = np.linspace(-most, most, 20_001)
     force = np.stack([pulls, np.full_like(pulls, weight(trunk))], axis=-1)
     torques = dynamics.inverse(LEG, theta, np.zeros(2), np.zeros(2), force)

@@ -67,7 +67,8 @@ def check(writer: Writer) -> str:
 
 
 def killed(writer: Writer, times: int, seed: int) -> None:
-    rng, left = random.Random(seed), []
+    rng = random.Random(seed)
+    left = []
     for _ in range(times):
         writer.kill_after(rng.uniform(0.0, 3.0 * writer.takes))
         left.append(check(writer))

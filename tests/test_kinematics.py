@@ -30,21 +30,21 @@ def test_forward_of_inverse_is_identity() -> None:
 
     Crossing circles place C to rounding / sin(angle at C), down to sqrt(rounding).
     """
-    rng, seen = np.random.default_rng(2), np.zeros((4, 2), dtype=int)
+    rng = np.random.default_rng(2)
+    seen = np.zeros((4, 2), dtype=int)
     for _ in range(500):
         leg = random_leg(rng)
         foot = rng.uniform(-1.0, 1.0, (400, 2)) * leg.size
         every = kinematics.inverse_all(leg, foot)
         for k, mode in enumerate(MODES):
             ok = np.isfinite(every[:, k, 0])
-            p, theta = foot[ok], kinematics.inverse(leg, foot[ok], mode)
+            p = foot[ok]
+            theta = kinematics.inverse(leg, foot[ok], mode)
             np.testing.assert_array_equal(theta, every[ok, k])
             assert ((-np.pi < theta) & (theta <= np.pi)).all()
             points = pose(leg, p, theta)
-            found, s = (
-                kinematics.branch(leg, points),
-                sine(points.C_left - points.B, points.C_right - points.D),
-            )
+            found = kinematics.branch(leg, points)
+            s = sine(points.C_left - points.B, points.C_right - points.D)
             assert (found.s_A == mode[0]).all()
             assert (found.s_E == mode[1]).all()
             for column, assembly in enumerate((-1, 1)):
@@ -59,8 +59,11 @@ def test_forward_of_inverse_is_identity() -> None:
 
 def in_line(leg: FiveBar, B: Array, outer: bool) -> tuple[Array, Array, float] | None:
     """Return C, D and |BD| with B, C, D in line: C between B and D (outer) or beyond one."""
-    E, (L2, L3) = kinematics.bases(leg)[1], (leg.L2, leg.L3)
-    d, e = L2 + L3 if outer else abs(L2 - L3), float(length(E - B))
+    E = kinematics.bases(leg)[1]
+    L2 = leg.L2
+    L3 = leg.L3
+    d = L2 + L3 if outer else abs(L2 - L3)
+    e = float(length(E - B))
     cosine = (e * e + d * d - leg.L4**2) / (2.0 * d * e)
     if abs(cosine) > 1.0:
         return None
@@ -70,7 +73,8 @@ def in_line(leg: FiveBar, B: Array, outer: bool) -> tuple[Array, Array, float] |
 
 def test_forward_of_inverse_with_B_C_D_in_line() -> None:
     """There h of `loop_joint` is the root of rounding: size sqrt(eps size / |BD|)."""
-    rng, seen = np.random.default_rng(4), 0
+    rng = np.random.default_rng(4)
+    seen = 0
     for k in range(1000):
         leg = random_leg(rng)
         B = kinematics.bases(leg)[0] + leg.L1 * unit(rng.uniform(-3.0, 3.0))
@@ -112,7 +116,8 @@ def test_round_trip(numbers: tuple[float, ...], foot: tuple[float, float], mode:
     leg = FiveBar(
         **dict(zip(("L1", "L2", "L3", "L4", "L5", "L6", "bend", "tilt"), numbers, strict=True))
     )
-    near, far = leg.L1, math.hypot(*leg.foot_offset)
+    near = leg.L1
+    far = math.hypot(*leg.foot_offset)
     r = abs(near - far) + foot[0] * 2.0 * min(near, far)
     p = kinematics.bases(leg)[0] + r * unit(foot[1])
     theta = kinematics.inverse_all(leg, p)[MODES.index(mode)]
@@ -137,7 +142,8 @@ def test_passive_angles_close_the_loop(batch: tuple[int, ...]) -> None:
 def test_inverse_nearest_is_the_nearest_of_all_solutions_in_all_turns() -> None:
     foot = sample(RIGID, (200,))[0]
     now = np.random.default_rng(6).uniform(-20.0, 20.0, (200, 2))
-    near, every = kinematics.inverse_nearest(RIGID, foot, now), kinematics.inverse_all(RIGID, foot)
+    near = kinematics.inverse_nearest(RIGID, foot, now)
+    every = kinematics.inverse_all(RIGID, foot)
     n = 2.0 * np.pi * np.arange(-4, 5)
     turns = np.stack(np.meshgrid(n, n), axis=-1).reshape(-1, 1, 1, 2)
     cost = np.sum((every + turns - now[:, None, :]) ** 2, axis=-1)
@@ -148,7 +154,8 @@ def test_inverse_nearest_is_the_nearest_of_all_solutions_in_all_turns() -> None:
 def test_inverse_nearest_is_continuous_along_a_path_through_half_a_turn() -> None:
     leg = FiveBar(0.03, 0.05, 0.055, 0.035, 0.0)  # coaxial: the foot can circle the motors
     path = 0.05 * unit(np.linspace(0.0, 4.0 * np.pi, 800))
-    now, angles = kinematics.inverse(leg, path[0]) + 2.0 * np.pi, []
+    now = kinematics.inverse(leg, path[0]) + 2.0 * np.pi
+    angles = []
     for foot in path:
         now = kinematics.inverse_nearest(leg, foot, now)
         angles.append(now)
@@ -167,7 +174,8 @@ def test_batch_is_a_plain_loop_to_the_last_bit() -> None:
 
 
 def test_array_is_the_loop_that_the_benchmark_times() -> None:
-    bench, leg = runpy.run_path(str(BENCH)), FiveBar()
+    bench = runpy.run_path(str(BENCH))
+    leg = FiveBar()
     points = bench["random_points"](leg, 20_000)
     theta = np.array(bench["inverse_loop"](leg, points.tolist()))
     np.testing.assert_allclose(kinematics.inverse(leg, points), theta, rtol=0, atol=1e-13)
@@ -178,9 +186,12 @@ def test_array_is_the_loop_that_the_benchmark_times() -> None:
 
 def test_right_angled_pose_by_hand() -> None:
     """|AF| = 50 mm: 3-4-5 triangles; A and E 60 mm apart, F 40 mm below their middle."""
-    a, corner = math.atan2(4.0, 3.0), math.pi / 2
+    a = math.atan2(4.0, 3.0)
+    corner = math.pi / 2
     every = kinematics.inverse_all(RIGHT, (0.0, -0.04))
-    A, E = (-2.0 * a, 0.0), (math.pi, 2.0 * a - math.pi)  # s = -1 and +1 of each; pi, not -pi
+    # s = -1 and +1 of each; pi, not -pi
+    A = (-2.0 * a, 0.0)
+    E = (math.pi, 2.0 * a - math.pi)
     np.testing.assert_allclose(every, [[x, z] for x in A for z in E], rtol=0, atol=1e-15)
     assert every[0, 1] == every[2, 1] == math.pi
     p = kinematics.closed_points(RIGHT, every[1], -1)
@@ -243,7 +254,8 @@ def test_minus_pi_is_never_returned() -> None:
 
 def test_unreachable_and_open_name_the_first_index() -> None:
     foot = np.full((2, 3, 2), [0.0, -0.04])
-    foot[1, 0], foot[1, 2] = (0.0, -0.5), (np.nan, 0.0)
+    foot[1, 0] = (0.0, -0.5)
+    foot[1, 2] = (np.nan, 0.0)
     with pytest.raises(
         UnreachableError, match=r"^2 of 6 points are out of reach: \|AF\| must be in"
     ) as info:
@@ -257,7 +269,8 @@ def test_unreachable_and_open_name_the_first_index() -> None:
         kinematics.inverse_nearest(RIGHT, foot, (0.0, 0.0))
     assert info.value.index == (1, 0)
     theta = np.full((2, 2, 2), [-1.85, -1.28])
-    theta[0, 1], theta[1, 1] = (math.pi, 0.0), (np.nan, 0.0)
+    theta[0, 1] = (math.pi, 0.0)
+    theta[1, 1] = (np.nan, 0.0)
     for f in (kinematics.forward, kinematics.passive, kinematics.jacobian):
         with pytest.raises(
             LoopOpenError, match=r"open in 2 of 4 poses.* got 0\.12 m at index"
@@ -275,7 +288,8 @@ def test_points_that_are_not_finite_are_out_of_reach(bad: float) -> None:
 
 
 def test_arguments_are_refused() -> None:
-    foot, theta = (0.0, -0.04), (-1.85, -1.28)
+    foot = (0.0, -0.04)
+    theta = (-1.85, -1.28)
     for mode in ((0, 1), (1,), "hanging"):
         with pytest.raises(ArgumentError, match=r"mode must be one of \(\(-1, -1\).*got"):
             kinematics.inverse(RIGHT, foot, mode)  # pyright: ignore[reportArgumentType]

@@ -37,7 +37,8 @@ SIDEWAYS = FiveBar(0.02, 0.05, 0.05, 0.02, 0.08, tilt=math.pi / 2)  # never on i
 def least_sine(leg: FiveBar, foot: Array) -> Array:
     """Return the least sine at B, D and C of poses on the leg's branch, 0 off it."""
     theta = kinematics.inverse_all(leg, foot)[:, MODES.index(leg.mode)]
-    p, (A, E) = pose(leg, foot, theta), kinematics.bases(leg)
+    p = pose(leg, foot, theta)
+    A, E = kinematics.bases(leg)
     DC = p.C_right - p.D
     with np.errstate(invalid="ignore"):
         at = [sine(p.B - A, foot - p.B), sine(p.D - E, DC), sine(p.C_left - p.B, DC)]
@@ -82,7 +83,8 @@ def test_stops_hold_the_angle_at_C_between_two_poses_in_line() -> None:
         q = kinematics.home(leg)
         for turns in (-2, 0, 1):  # of a motor: the angle at C goes with it
             rest = q + 2.0 * math.pi * turns * np.array([1.0, 0.0, 0.0, 0.0])
-            angle, (low, high) = float(stops.angle_at_C(rest)), stops.stops_at_C(rest)
+            angle = float(stops.angle_at_C(rest))
+            low, high = stops.stops_at_C(rest)
             assert low < angle < high
             assert high - low == pytest.approx(math.pi - 2.0 * math.radians(2.0), abs=1e-14)
             assert math.sin(low - stops.C_STOP) == pytest.approx(0.0, abs=1e-14)
@@ -110,7 +112,8 @@ def test_open_chains_of_a_closed_pose_are_the_closed_pose() -> None:
     """Every joint, one by one, and by turning complex numbers."""
     theta = sample(RIGID, (50,))[1]
     q = np.insert(theta, (1, 2), kinematics.passive(RIGID, theta), axis=-1)
-    chains, closed = kinematics.chain_points(RIGID, q), kinematics.closed_points(RIGID, theta)
+    chains = kinematics.chain_points(RIGID, q)
+    closed = kinematics.closed_points(RIGID, theta)
     for one, two in zip(chains, closed, strict=True):
         np.testing.assert_allclose(one, two, rtol=0, atol=1e-15)
     E = 0.5 * RIGID.L5 * np.exp(1j * RIGID.tilt)
@@ -138,7 +141,8 @@ def refused(error: type[Exception], ask: Callable[[], object]) -> str:
 
 def test_messages_of_single_poses_and_of_batches() -> None:
     open_ = "|BD| must be above 0 and in [0, 0.08] m, got 0.12 m"
-    apart, foot = (math.pi, 0.0), (0.0, -0.04)
+    apart = (math.pi, 0.0)
+    foot = (0.0, -0.04)
     for theta, said in (
         (apart, f"the loop is open here: {open_}"),
         ([[apart]], f"the loop is open in 1 of 1 poses: {open_} at index (0, 0)"),
@@ -180,12 +184,14 @@ def test_limits_are_finite_on_every_side() -> None:
 
 def test_what_is_beyond_the_limits_is_told_whole() -> None:
     """The limits that no mode keeps, or both where each is kept in one, in degrees too."""
-    foot, deg = (0.004, -0.042), "([57.2958, 114.592] deg)"
+    foot = (0.004, -0.042)
+    deg = "([57.2958, 114.592] deg)"
     beyond = "beyond the joint limits in every working mode:"
     A = f"theta_A must be in [1, 2] rad {deg}, got -1.70686 or -0.0736923 rad"
     E = f"theta_E must be in [1, 2] rad {deg}, got -3.06844 or -1.18176 rad"
     at = "for the foot at (0.004, -0.042) m"
-    one, wide = (1.0, 2.0), (-4.0, 4.0)
+    one = (1.0, 2.0)
+    wide = (-4.0, 4.0)
     for points, limits, said in (
         (foot, (one, wide), f"the point is {beyond} {A}, {at}"),
         ([foot] * 2, (wide, one), f"2 of 2 points are {beyond} {E}, {at} at index (0,)"),
@@ -208,12 +214,16 @@ def test_message_out_of_reach_has_the_numbers_of_the_side_that_fails(
     seen = dict.fromkeys(("AF", "EC" if leg.L6 else "EF"), 0)
     for x, z in np.random.default_rng(5).uniform(-0.2, 0.2, (60, 2)).tolist():
         AF = complex(x, z) + E
-        r, rho = abs(AF), abs(BF)
-        what, ends, got = "AF", (leg.L1, rho), r
+        r = abs(AF)
+        rho = abs(BF)
+        what = "AF"
+        ends = (leg.L1, rho)
+        got = r
         if abs(leg.L1 - rho) <= r <= leg.L1 + rho:
             inside = math.acos((r * r + leg.L1**2 - rho**2) / (2.0 * r * leg.L1))
             AB = leg.L1 * AF / r * cmath.exp(1j * mode[0] * inside)
-            what, ends = ("EC" if leg.L6 else "EF"), (leg.L4, leg.L3)
+            what = "EC" if leg.L6 else "EF"
+            ends = (leg.L4, leg.L3)
             got = abs(AB + (AF - AB) * leg.L2 / BF - 2.0 * E)
             if abs(ends[0] - ends[1]) <= got <= sum(ends):
                 assert np.isfinite(kinematics.inverse(leg, (x, z), mode)).all()

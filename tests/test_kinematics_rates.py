@@ -27,7 +27,8 @@ IN_LINE = (math.pi, 0.0)
 def test_jacobian_is_the_slope_of_forward(
     batch: tuple[int, ...], mode: Mode, assembly: int
 ) -> None:
-    theta, h = sample(RIGID, batch, mode, assembly)[1], 3e-6
+    theta = sample(RIGID, batch, mode, assembly)[1]
+    h = 3e-6
     steps = [kinematics.forward(RIGID, theta + h * e, assembly) for e in (*np.eye(2), *-np.eye(2))]
     slopes = np.stack([(steps[0] - steps[2]), (steps[1] - steps[3])], axis=-1) / (2.0 * h)
     J = kinematics.jacobian(RIGID, theta, assembly)
@@ -38,7 +39,8 @@ def test_jacobian_is_the_slope_of_forward(
 @pytest.mark.parametrize("batch", BATCHES)
 @pytest.mark.parametrize("mode", MODES)
 def test_joint_motion_is_the_slope_of_inverse(batch: tuple[int, ...], mode: Mode) -> None:
-    (foot, theta), h = sample(RIGID, batch, mode), 1e-5
+    foot, theta = sample(RIGID, batch, mode)
+    h = 1e-5
     v, a = np.random.default_rng(8).uniform(-0.1, 0.1, (2, *foot.shape))
     now, after, before = (
         kinematics.joint_motion(RIGID, foot + v * t + a * t**2 / 2, v + a * t, a, mode)
@@ -107,7 +109,8 @@ def test_singular_poses_name_the_first_index() -> None:
     ):
         kinematics.jacobian(LINE, IN_LINE)
 
-    leg, still = FiveBar(0.25, 0.5, 0.5, 0.375, 0.5), np.zeros(2)
+    leg = FiveBar(0.25, 0.5, 0.5, 0.375, 0.5)
+    still = np.zeros(2)
     for x_F, chain in ((0.5, "A, B and F"), (-0.625, "E, D and C")):  # stretched to the last bit
         foot = [(0.0, -0.5), (x_F, 0.0)]
         with pytest.raises(SingularError, match=f"{chain} are in line") as info:
@@ -122,7 +125,8 @@ def test_open_and_unreachable_and_wrong_shapes_are_refused() -> None:
         kinematics.joint_motion(RIGHT, (0.0, -0.5), (0.0, 0.0), (0.0, 0.0))
     with pytest.raises(ArgumentError, match="assembly must be -1 or 1, got 2"):
         kinematics.jacobian(RIGHT, (-1.85, -1.28), 2)
-    pair, three = (0.0, -0.04), (0.0, 0.0, 0.0)
+    pair = (0.0, -0.04)
+    three = (0.0, 0.0, 0.0)
     with pytest.raises(ArgumentError, match=r"foot_dot must have shape"):
         kinematics.joint_motion(RIGHT, pair, three, pair)
     with pytest.raises(ArgumentError, match=r"foot_ddot must have shape"):

@@ -21,7 +21,8 @@ from fivebar_sim.metrics import load
 H = 0.5
 """Timestep [s] of what is not simulated; its multiples are exact."""
 
-ONE, TWO = [[1.0, 1.0]], [[0.0, 0.0], [1.0, 1.0]]
+ONE = [[1.0, 1.0]]
+TWO = [[0.0, 0.0], [1.0, 1.0]]
 SHARES = ("share_A", "thermal_share_A", "peak_ratio", "rms_ratio")
 
 Window = tuple[Array, Array]
@@ -59,7 +60,8 @@ def swapped(measured: dict[str, Any]) -> dict[str, Any]:
 
 def same(found: Any, wanted: Any) -> None:
     """Assert equal keys, None in the same places, and numbers equal but for rounding."""
-    one, two = dict(leaves(found)), dict(leaves(wanted))
+    one = dict(leaves(found))
+    two = dict(leaves(wanted))
     assert one.keys() == two.keys()
     for key, value in one.items():
         assert type(value) in (float, type(None)), key
@@ -74,7 +76,8 @@ def same(found: Any, wanted: Any) -> None:
 def test_shares_have_no_unit(window: Window, power: int, mirrored: bool) -> None:
     torque, theta = window
     scale = 2.0**power * (-1.0 if mirrored else 1.0)
-    once, more = load.measure(torque, theta, H), load.measure(scale * torque, theta, H)
+    once = load.measure(torque, theta, H)
+    more = load.measure(scale * torque, theta, H)
     assert [more[key] for key in SHARES] == [once[key] for key in SHARES]
     assert more["opposing"].pop("energy") == abs(scale) * once["opposing"].pop("energy")
     assert more["opposing"] == once["opposing"]
@@ -172,8 +175,11 @@ def test_a_plain_loop_measures_the_same(window: Window) -> None:
 
 def test_work_is_the_energy_that_the_leg_gained() -> None:
     """Torques held over steps of 2 ms, the motion between by Runge-Kutta at 0.05 ms."""
-    leg, h, fine = FiveBar.load("extended"), 2e-3, 40
-    theta, rate = [kinematics.home(leg)[::2]], [np.zeros(2)]
+    leg = FiveBar.load("extended")
+    h = 2e-3
+    fine = 40
+    theta = [kinematics.home(leg)[::2]]
+    rate = [np.zeros(2)]
     turn = 0.7 * np.arange(40)[:, None]
     torque = 4e-3 * np.cos(turn + np.array([0.0, np.pi + 0.4]))
     for tau in torque:
@@ -182,7 +188,9 @@ def test_work_is_the_energy_that_the_leg_gained() -> None:
         theta.append(held.theta[-1])
         rate.append(held.theta_dot[-1])
     energy = np.sum(dynamics.energy(leg, theta, rate), axis=0)
-    gained, before, after = float(energy[-1] - energy[0]), np.array(rate[:-1]), np.array(rate[1:])
+    gained = float(energy[-1] - energy[0])
+    before = np.array(rate[:-1])
+    after = np.array(rate[1:])
     A, E = load.measure(torque, theta, h)["work"].values()
     spent = A["positive"] - A["negative"] + E["positive"] - E["negative"]
     assert abs(gained) > 0.04 * spent
@@ -194,7 +202,8 @@ def test_work_is_the_energy_that_the_leg_gained() -> None:
 
 def test_work_at_rest_is_what_the_foot_does_to_the_world() -> None:
     """Tau = -J^T F at the middle of each step: an error of order 2 in the step."""
-    leg, force = FiveBar.load("classic"), np.array([1.0, 4.0])
+    leg = FiveBar.load("classic")
+    force = np.array([1.0, 4.0])
     off = []
     for rows in (50, 100):
         s = np.linspace(0.0, 1.0, 2 * rows + 1)
@@ -240,7 +249,8 @@ def test_idle_motors_share_nothing() -> None:
 @pytest.mark.parametrize(("part", "defined"), [(0.9, False), (1.1, True)])
 def test_rounding_is_no_load(part: float, defined: bool) -> None:
     small = part * load.TINY
-    torque, theta = [[1.0, 1.0], [small, -small]], [[0.0, 0.0], [1.0, 1.0], [2.0, 2.0]]
+    torque = [[1.0, 1.0], [small, -small]]
+    theta = [[0.0, 0.0], [1.0, 1.0], [2.0, 2.0]]
     found = load.measure(torque, theta, H, stance=[False, True], phase=[0.0, 0.5], bins=2)
     assert (found["stance"]["share_A"] == 0.5) is defined
     assert (found["phase"]["share_A"][1] == 0.5) is defined

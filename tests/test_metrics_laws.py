@@ -81,7 +81,8 @@ def motors(record: dict[str, Array], name: str) -> Array:
 
 
 def test_tracking_is_of_the_window_and_closure_of_the_whole_run(rng: np.random.Generator) -> None:
-    record, window = a_record(rng), ELLIPSE.window
+    record = a_record(rng)
+    window = ELLIPSE.window
     assert (window.start, window.stop) == (250, 750)  # a ramp, and one period of 2 Hz
     found = measured(ELLIPSE, record)
     off = [(record[f"foot_{x}"] - record[f"target_{x}"])[window] for x in "xz"]
@@ -104,7 +105,8 @@ def test_load_is_that_of_the_windows_torques_over_the_turns_of_their_steps(
     rng: np.random.Generator,
 ) -> None:
     record = a_record(rng)
-    torque, theta = motors(record, "torque"), motors(record, "theta")
+    torque = motors(record, "torque")
+    theta = motors(record, "theta")
     saturated = rng.random((ROWS, 2)) < [0.2, 0.6]
     for scenario, start in ((ELLIPSE, theta[249]), (ONCE, START)):  # before the window's first step
         window = scenario.window
@@ -121,9 +123,11 @@ def test_load_is_that_of_the_windows_torques_over_the_turns_of_their_steps(
 
 def test_phase_and_stance_are_those_of_when_the_steps_began(rng: np.random.Generator) -> None:
     record = a_record(rng)
-    torque, theta = motors(record, "torque"), motors(record, "theta")
+    torque = motors(record, "torque")
+    theta = motors(record, "theta")
     for scenario in (ELLIPSE, STEPS, ONCE):
-        window, path = scenario.window, scenario.path
+        window = scenario.window
+        path = scenario.path
         began = H * np.arange(float(window.start), window.stop)
         turned = np.concatenate([START[None], theta])[window.start : window.stop + 1]
         stance = path.in_stance(began) if isinstance(path, Gait) else None
@@ -139,7 +143,8 @@ def test_ground_says_when_the_foot_stood(rng: np.random.Generator) -> None:
     down = (np.arange(ROWS) // 50) % 3 == 0  # the first 50 ms of every 150
     record = on_floor(a_record(rng), down)
     for scenario in (STEPS, ELLIPSE):
-        found, window = measured(scenario, record), scenario.window
+        found = measured(scenario, record)
+        window = scenario.window
         assert found["ground"] == ground.measure(scenario.leg, record, window)
         torque = motors(record, "torque")[window][down[window]]
         rms = np.sqrt(np.mean(torque**2, axis=0))
@@ -159,7 +164,8 @@ def test_energy_and_guards_are_those_of_the_whole_run(rng: np.random.Generator, 
     if scene == "rail":
         record = on_floor(record, (np.arange(ROWS) % 2).astype(float))
     saturated = rng.random((ROWS, 2)) < 0.9
-    found, more = measured(scenario, record, saturated), besides(record, saturated)
+    found = measured(scenario, record, saturated)
+    more = besides(record, saturated)
     works = energy.balance(energy.Body(LEG, *mine), record, more.steps)
     assert found["energy"] == energy.measure(works)
     judged = guards.judge(
@@ -213,7 +219,8 @@ def test_each_sign_of_the_branch_flips_alone(rng: np.random.Generator, sign: str
 
 def off_by(errors: list[float]) -> dict[str, Array]:
     """Return the record of a foot that is so many of the leg's sizes off, 3 to 4 in x and z."""
-    off, time = LEG.size * np.array(errors), np.arange(1.0, len(errors) + 1)
+    off = LEG.size * np.array(errors)
+    time = np.arange(1.0, len(errors) + 1)
     columns = {"foot_x": 1.0 + 0.6 * off, "foot_z": 2.0 - 0.8 * off}
     still = np.ones(len(errors))
     return {"time": time, "target_x": still, "target_z": 2.0 * still, **columns}
@@ -231,7 +238,8 @@ def test_path_is_lost_at_the_legs_size_and_left_at_a_tenth_of_it() -> None:
         assert metrics.lost_path(LEG, record) == lost
         by = lost if lost is not None else float(len(errors))
         assert metrics.left_path(LEG, record, by) == left
-    zero, edge = np.zeros(2), np.array([LEG.size, 0.1 * LEG.size])
+    zero = np.zeros(2)
+    edge = np.array([LEG.size, 0.1 * LEG.size])
     record = {"time": edge, "foot_x": edge, "foot_z": zero, "target_x": zero, "target_z": zero}
     assert metrics.lost_path(LEG, record) is None  # on the edge to the last bit
     assert metrics.left_path(LEG, record, 1.0) == edge[1]
@@ -276,7 +284,8 @@ def test_one_bad_phase_of_many_is_refused(phase: list[Any], message: str) -> Non
 
 
 def test_largest_torque_is_legal_and_the_float_after_it_is_not() -> None:
-    most, still = load.LARGEST, np.zeros((2, 2))
+    most = load.LARGEST
+    still = np.zeros((2, 2))
     assert load.measure([[most, -most]], still, H)["torque_peak"] == {"A": most, "E": most}
     with pytest.raises(ArgumentError, match=r"torque must be in \[-1e\+09, 1e\+09\] N m, got"):
         load.measure([[0.0, np.nextafter(most, np.inf)]], still, H)

@@ -126,7 +126,8 @@ def test_inertias_are_the_legs(leg: FiveBar) -> None:
 
 
 def test_servo_is_what_was_asked(leg: FiveBar) -> None:
-    ideal, driven = model.build(leg), model.build(leg, servo=Servo(kp=3.0, kd=0.02, limit=0.5))
+    ideal = model.build(leg)
+    driven = model.build(leg, servo=Servo(kp=3.0, kd=0.02, limit=0.5))
     for name in ("A", "E"):
         assert ideal.joint(name).damping == 0.0
         assert not ideal.actuator(name).forcelimited
@@ -161,7 +162,8 @@ def test_two_legs_attach_to_one_body(integrator: model.Integrator) -> None:
                 name = getattr(alone, kind)(i).name
                 if name in ("world", "floor"):
                     continue
-                one, two = getattr(alone, kind)(name), getattr(both, kind)(prefix + name)
+                one = getattr(alone, kind)(name)
+                two = getattr(both, kind)(prefix + name)
                 for field in SAME[kind]:
                     np.testing.assert_array_equal(getattr(one, field), getattr(two, field))
 

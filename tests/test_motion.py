@@ -12,7 +12,8 @@ from fivebar_sim.errors import ArgumentError, UnreachableError
 from fivebar_sim.motion import KNEE_STOP, Motion, edge_margin, plan, rates
 from fivebar_sim.paths import Circle, Gait, Hop, Line, Lines, Step
 
-CLASSIC, HOCKEY = FiveBar.load("classic"), FiveBar.load("airhockey")
+CLASSIC = FiveBar.load("classic")
+HOCKEY = FiveBar.load("airhockey")
 STUDY = ((0.6, 0.4), (0.5, 0.5), (-0.25, 0.25), (-0.2, 0.6), (0.3, 0.6))
 """The path of a published control study of this leg, [m] from A."""
 
@@ -89,7 +90,8 @@ def _beside_home() -> Line:
     ids=["right", "left", "circle"],
 )
 def test_targets_out_of_reach_go_to_the_nearest_point(leg: FiveBar, path: Lines | Circle) -> None:
-    m, target = plan(leg, path, 2000, H), path.at(np.arange(2001) * H).position
+    m = plan(leg, path, 2000, H)
+    target = path.at(np.arange(2001) * H).position
     margin = edge_margin(leg)
     kept = workspace.distance(leg, target) >= margin
     assert 0.1 < kept.mean() < 0.95

@@ -67,14 +67,16 @@ def test_pose_has_the_links_and_its_mode(leg: Leg, mode: tuple[int, int]) -> Non
 
 
 def test_tilt_turns_the_leg_about_the_origin() -> None:
-    flat, turn = replace(ODD, tilt=0.0), cmath.rect(1.0, ODD.tilt)
+    flat = replace(ODD, tilt=0.0)
+    turn = cmath.rect(1.0, ODD.tilt)
     psi = np.array(oracle.pose(flat, -0.07j)) + ODD.tilt
     np.testing.assert_allclose(oracle.pose(ODD, -0.07j * turn), psi, rtol=0, atol=1e-14)
 
 
 @LEGS
 def test_slopes_of_pose_are_its_rates(leg: Leg) -> None:
-    h, t = 1e-4, 0.13
+    h = 1e-4
+    t = 0.13
     before, now, after = (np.array(oracle.pose(leg, on(ROUND, s)[0])) for s in (t - h, t, t + h))
     _, psi_dot, psi_ddot = state(leg, t)
     # error: h^2 psi''' / 6 ~ 1e-9 * 1e4 / 6 and h^2 psi'''' / 12 ~ 1e-8 * 1e6 / 12
@@ -105,8 +107,10 @@ def test_batch_is_a_loop(batch: tuple[int, ...]) -> None:
 
 def places(leg: Leg, psi: list[float]) -> Array:
     """The four centres of mass, with sines and cosines, without arms."""
-    (L1, _, _, L4, L5), out = leg.lengths, np.zeros((4, 2))
-    c, s = np.cos(psi), np.sin(psi)
+    L1, _, _, L4, L5 = leg.lengths
+    out = np.zeros((4, 2))
+    c = np.cos(psi)
+    s = np.sin(psi)
     half = 0.5 * L5 * np.array([math.cos(leg.tilt), math.sin(leg.tilt)])
     inner = [-half, -half + L1 * np.array([c[0], s[0]]), half + L4 * np.array([c[3], s[3]]), half]
     for i, r in enumerate(leg.com):
@@ -116,7 +120,8 @@ def places(leg: Leg, psi: list[float]) -> Array:
 
 @LEGS
 def test_mass_matrix_is_kinetic_energy(leg: Leg) -> None:
-    psi, h = state(leg)[0], 1e-5
+    psi = state(leg)[0]
+    h = 1e-5
     M = np.array(oracle.mass_matrix(leg, psi))
     np.testing.assert_array_equal(M, M.T)
     assert np.linalg.eigvalsh(M).min() > 0.0
@@ -142,7 +147,8 @@ def test_potential_energy_is_work_against_gravity(leg: Leg) -> None:
 @LEGS
 def test_bias_is_lagranges(leg: Leg) -> None:
     psi, w, _ = state(leg)
-    h, rate = 1e-5, np.array(w)
+    h = 1e-5
+    rate = np.array(w)
 
     def slope(f, along: list[float]):  # central difference of f(psi)
         return (f(moved(psi, along, h)) - f(moved(psi, along, -h))) / (2 * h)
@@ -162,7 +168,9 @@ def test_bias_is_lagranges(leg: Leg) -> None:
 @LEGS
 def test_power_balances_and_the_loop_stays(leg: Leg) -> None:
     psi, w, _ = state(leg)
-    tau, F, h = (0.02, -0.03), 0.3 + 0.8j, 1e-6
+    tau = (0.02, -0.03)
+    F = 0.3 + 0.8j
+    h = 1e-6
     a, _ = oracle.forward_dynamics(leg, psi, w, tau, F)
     arms = oracle.loop(leg, psi)[1]
     size = 0.06 * max(map(abs, a))  # the terms that cancel [m/s^2]
@@ -192,14 +200,17 @@ def test_inverse_dynamics_undoes_forward(leg: Leg) -> None:
 
 @LEGS
 def test_static_torque_is_jacobian_times_force(leg: Leg) -> None:
-    psi, h, F = oracle.pose(leg, 0.004 - 0.08j), 1e-6, np.array([3.0, 20.0])
+    psi = oracle.pose(leg, 0.004 - 0.08j)
+    h = 1e-6
+    F = np.array([3.0, 20.0])
     assert oracle.assembly_of(leg, psi) == leg.assembly
 
     def foot(psi1: float, psi4: float) -> Array:
         at = oracle.position(oracle.foot(leg, oracle.closed(leg, psi1, psi4)))
         return np.array([at.real, at.imag])
 
-    q, e = psi[0], psi[3]
+    q = psi[0]
+    e = psi[3]
     J = np.stack([foot(q + h, e) - foot(q - h, e), foot(q, e + h) - foot(q, e - h)], -1) / (2 * h)
     tau = oracle.inverse_dynamics(
         replace(leg, gravity=0j), [0.004, -0.08], [0.0, 0.0], [0.0, 0.0], F
@@ -211,11 +222,13 @@ def test_static_torque_is_jacobian_times_force(leg: Leg) -> None:
 @LEGS
 def test_multiplier_is_the_force_on_link_2(leg: Leg) -> None:
     """At rest the moments on L2 about B and on L3 about D vanish, which leaves one lambda."""
-    target, F = 0.004 - 0.08j, 1.2 + 3.4j
+    target = 0.004 - 0.08j
+    F = 1.2 + 3.4j
     psi = oracle.pose(leg, target)
     tau = oracle.torques(leg, target, 0j, 0j, F)
     psi_ddot, force = oracle.forward_dynamics(leg, psi, [0.0] * 4, tau, F)
-    e2, e3 = cmath.rect(1.0, psi[1]), cmath.rect(1.0, psi[2])
+    e2 = cmath.rect(1.0, psi[1])
+    e3 = cmath.rect(1.0, psi[2])
     weight = [m * leg.gravity for m in leg.mass]
     loads = [  # (arm, force): moment = arm x force
         [(leg.lengths[1] * e2, force), (leg.foot_offset * e2, F), (leg.com[1] * e2, weight[1])],
@@ -228,7 +241,8 @@ def test_multiplier_is_the_force_on_link_2(leg: Leg) -> None:
 
 
 def test_point_mass_at_the_foot_is_carried_by_statics() -> None:
-    m, zero = 0.1, (0.0, 0.0, 0.0, 0.0)
+    m = 0.1
+    zero = (0.0, 0.0, 0.0, 0.0)
     leg = replace(
         ODD,
         mass=(0.0, m, 0.0, 0.0),

@@ -32,7 +32,8 @@ ODD = replace(  # nothing equal, nothing on an axis: a swap or a lost sign shows
 )
 LEGS = pytest.mark.parametrize("leg", [CLASSIC, ODD], ids=["classic", "odd"])
 ELLIPSE = eased_ellipse((0.0, -0.072), (0.020, 0.008), 2.0, 0.25)
-PLAIN, AHEAD = Servo(8.0, 0.05), Servo(8.0, 0.05, "velocity")
+PLAIN = Servo(8.0, 0.05)
+AHEAD = Servo(8.0, 0.05, "velocity")
 
 
 def held(x: float, z: float) -> Path:
@@ -97,7 +98,8 @@ def test_free_swing_keeps_its_energy(
 
 @LEGS
 def test_energy_gained_is_work_done(leg: Leg) -> None:
-    force, times = 0.5 + 1.0j, np.linspace(0.0, 0.4, 4001)
+    force = 0.5 + 1.0j
+    times = np.linspace(0.0, 0.4, 4001)
     motion = simulate(leg, PLAIN, ELLIPSE, 0.4, times, foot_force=lambda t: force * math.sin(9 * t))
     power = np.sum(motion.tau * motion.theta_dot, axis=1)
     for i, (psi, psi_dot) in enumerate(
@@ -168,14 +170,16 @@ def test_at_rest_the_servo_sags_by_statics() -> None:
 
 
 def test_only_the_stiffness_term_is_limited() -> None:
-    servo, psi = replace(PLAIN, limit=0.1), oracle.pose(CLASSIC, -0.07j)
+    servo = replace(PLAIN, limit=0.1)
+    psi = oracle.pose(CLASSIC, -0.07j)
     theta = (psi[0] - 1.0, psi[3] + 1.0)
     tau = servo(CLASSIC, held(0.0, -0.07), 0.0, theta, (10.0, 2.0))
     np.testing.assert_allclose(tau, (0.1 - 0.5, -0.1 - 0.1), rtol=1e-14)
 
 
 def test_servo_does_not_care_for_whole_turns() -> None:
-    path, psi = held(0.0, -0.07), oracle.pose(CLASSIC, -0.07j)
+    path = held(0.0, -0.07)
+    psi = oracle.pose(CLASSIC, -0.07j)
     theta = (psi[0] + 0.01 + 2 * math.pi, psi[3] - 0.02 - 2 * math.pi)
     tau = PLAIN(CLASSIC, path, 0.0, theta, (0.0, 0.0))
     np.testing.assert_allclose(tau, (-0.08, 0.16), rtol=1e-12)  # rounding of 2 pi

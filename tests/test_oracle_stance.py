@@ -30,7 +30,8 @@ TIMES: Array = np.linspace(0.001, 0.4, 400)
 
 
 def squat(name: str, *, grips: bool, servo: Servo = SERVO, still: bool = False) -> Stance:
-    leg, path = SQUATS[name][0], path_of(name, still=still)
+    leg = SQUATS[name][0]
+    path = path_of(name, still=still)
     return simulate(leg, Ground(0.5, 0.006, grips), servo, path, TIMES)
 
 
@@ -87,7 +88,8 @@ def test_floor_holds_and_the_ball_rolls(name: str) -> None:
 @GRIPS
 def test_hip_accelerates_by_what_the_floor_gives(name: str, grips: bool) -> None:
     """N - weight = sum m a over trunk and links, the accelerations by differences."""
-    leg, motion = SQUATS[name][0], squat(name, grips=grips)
+    leg = SQUATS[name][0]
+    motion = squat(name, grips=grips)
     psi = [oracle.closed(leg, *theta) for theta in motion.theta.tolist()]
     height = motion.hip_z * (0.5 + sum(leg.mass))
     height += [
@@ -112,8 +114,11 @@ def test_hip_accelerates_by_what_the_floor_gives(name: str, grips: bool) -> None
 @GRIPS
 def test_torques_are_those_of_the_lifted_leg(name: str, grips: bool) -> None:
     """In the hip's falling frame it is a leg in the air, with less weight and a foot force."""
-    leg, ground = SQUATS[name][0], Ground(0.5, 0.0, grips)  # without radius, T acts at F itself
-    psi, rate = oracle.closed(leg, -2.2, -0.9), [3.0, -2.0]
+    # without radius, T acts at F itself
+    leg = SQUATS[name][0]
+    ground = Ground(0.5, 0.0, grips)
+    psi = oracle.closed(leg, -2.2, -0.9)
+    rate = [3.0, -2.0]
     psi_dot = oracle_simulation.knee_rates(leg, psi, *rate)
     psi_ddot, lift, force = oracle_stance.forward_dynamics(leg, ground, psi, psi_dot, (0.1, -0.2))
     lifted = replace(leg, gravity=leg.gravity - 1j * lift)

@@ -113,7 +113,8 @@ def test_batches_equal_a_plain_loop(
 
 @pytest.mark.parametrize("name", NAMES)
 def test_velocity_and_acceleration_are_slopes(paths: dict[str, FootPath], name: str) -> None:
-    path, step = paths[name], 1e-6
+    path = paths[name]
+    step = 1e-6
     time = np.random.default_rng(1).uniform(step, min(path.end, 0.6) - step, 2000)
     time = time[np.abs(time[:, None] - kinks(path)).min(axis=1) > 2.0 * step]
     slopes = difference(path.at(time + step), path.at(time - step)) / (2.0 * step)
@@ -126,7 +127,8 @@ def test_velocity_and_acceleration_are_slopes(paths: dict[str, FootPath], name: 
 
 @pytest.mark.parametrize("name", NAMES)
 def test_seams_are_smooth_up_to_the_acceleration(paths: dict[str, FootPath], name: str) -> None:
-    path, step = paths[name], 1e-9
+    path = paths[name]
+    step = 1e-9
     seams = kinks(path)
     seams = seams[(seams > 0.0) & (seams < path.end)]
     jumps = difference(path.at(seams + step), path.at(seams - step))
@@ -157,7 +159,8 @@ def test_ramp_of_zero_starts_at_speed() -> None:
 @pytest.mark.parametrize("name", ["ellipse", "circle"])
 def test_orbits_start_lowest_towards_plus_x(name: str) -> None:
     path = SHAPES[name]
-    start, time = path.nominal(0.0), np.linspace(0.0, 0.5, 1001)
+    start = path.nominal(0.0)
+    time = np.linspace(0.0, 0.5, 1001)
     assert np.argmin(path.nominal(time[:-1]).position[:, 1]) == 0
     assert start.velocity[0] > 0.0
     assert start.velocity[1] == 0.0

@@ -103,7 +103,8 @@ def test_trot_of_the_q8bot() -> None:
     assert path.period == pytest.approx(1.8, rel=1e-12)
     np.testing.assert_allclose(path.nominal(rows[:, 0]).position, 1e-3 * rows[:, 1:], atol=1e-16)
     # 8 equal cycles, to the spline's memory of the table's rounded times
-    one, two = path.nominal(np.linspace(0.3, 0.5, 99)), path.nominal(np.linspace(0.525, 0.725, 99))
+    one = path.nominal(np.linspace(0.3, 0.5, 99))
+    two = path.nominal(np.linspace(0.525, 0.725, 99))
     np.testing.assert_allclose(one.position, two.position, atol=1e-14)
     # what rounding the corners costs: it dips 0.356 mm below the commanded ground line
     lowest = path.nominal(np.linspace(0.0, 1.8, 180_001)).position[:, 1].min()

@@ -72,7 +72,8 @@ def test_swing_never_passes_lift_or_turns_on_its_way(path: Gait, part: float) ->
         ramp=0.0,
     )
     u = np.linspace(1e-6, 1.0 - 1e-6, 1001)
-    start, swing = 0.5 * path.duty, 1.0 - path.duty
+    start = 0.5 * path.duty
+    swing = 1.0 - path.duty
     foot = path.at((start + swing * u) / path.frequency)
     height = foot.position[:, 1] - path.centre[1]
     assert np.max(height) == pytest.approx(path.lift, rel=1e-12)
@@ -119,7 +120,8 @@ def test_gait_begins_in_mid_stance_and_passes_its_marks() -> None:
 
 
 def test_touch_down_is_as_fast_as_asked_and_does_not_slip() -> None:
-    before, after = GAIT.at(LANDING - 1e-9), GAIT.at(LANDING + 1e-9)
+    before = GAIT.at(LANDING - 1e-9)
+    after = GAIT.at(LANDING + 1e-9)
     assert not GAIT.in_stance(LANDING - 1e-9)
     assert GAIT.in_stance(LANDING + 1e-9)
     # 1 ns times 35 m/s^2

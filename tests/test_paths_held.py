@@ -57,7 +57,8 @@ def test_step_is_half_way_and_lifted_at_half_time(
 def test_velocity_of_lines_is_that_of_the_next_line_at_a_point() -> None:
     path = Lines(points=POINTS, seconds=0.5)
     assert path.rest == 1.0
-    before, at = path.at(0.5 - 1e-12), path.at(0.5)
+    before = path.at(0.5 - 1e-12)
+    at = path.at(0.5)
     np.testing.assert_array_equal(at.position, POINTS[1])
     np.testing.assert_allclose(before.velocity, (-0.06, 0.02), rtol=1e-12)
     np.testing.assert_allclose(at.velocity, (0.0, -0.04), rtol=0.0, atol=1e-15)

@@ -57,7 +57,8 @@ def difference(after: Sample, before: Sample) -> np.ndarray:
 def test_cyclic_paths_repeat(name: str, time: float, cycles: int) -> None:
     path = PATHS[name]
     assert path.period == PERIOD
-    now, later = path.at(time), path.at(time + cycles * PERIOD)
+    now = path.at(time)
+    later = path.at(time + cycles * PERIOD)
     seams = np.array(SEAMS[name]) / PERIOD
     if np.min(np.abs((time / PERIOD - seams + 0.5) % 1.0 - 0.5)) > 1e-12:
         # rounding of t < 23 s is 4e-15 s; times velocity 1, acceleration 50, jerk 1e4 in SI
@@ -91,7 +92,8 @@ def test_batches_equal_a_plain_loop(path: FootPath, batch: tuple[int, ...]) -> N
 
 @pytest.mark.parametrize("name", PATHS)
 def test_velocity_and_acceleration_are_slopes(name: str) -> None:
-    path, step = PATHS[name], 1e-6
+    path = PATHS[name]
+    step = 1e-6
     time = np.random.default_rng(1).uniform(step, 1.2, 2000)
     seams = np.array([*SEAMS[name], 0.0])
     time = time[np.abs(time[:, None] - seams).min(axis=1) > 2.0 * step]
@@ -105,7 +107,8 @@ def test_velocity_and_acceleration_are_slopes(name: str) -> None:
 
 @pytest.mark.parametrize("name", PATHS)
 def test_seams_are_continuous(name: str) -> None:
-    path, step = PATHS[name], 1e-9
+    path = PATHS[name]
+    step = 1e-9
     seams = np.array(SEAMS[name])
     jumps = np.abs(difference(path.at(seams + step), path.at(seams - step)))
     # 2 step times the next derivative: velocity < 2 m/s, acceleration < 50 m/s^2, jerk < 1e4 m/s^3

@@ -82,7 +82,8 @@ def test_path_is_the_studys_from_A(ran: dict[str, Result]) -> None:
 @pytest.mark.parametrize("dx", [0.4, -0.4])
 def test_moved_path_stays_in_the_workspace(ran: dict[str, Result], dx: float) -> None:
     result = ran[f"moved {dx:g}"]
-    leg, record = result.scenario.leg, result.record
+    leg = result.scenario.leg
+    record = result.record
     targets = np.stack([record["target_x"], record["target_z"]], axis=-1)
     asked = result.scenario.path.at(record["time"]).position
     assert workspace.reachable(leg, targets, mode=leg.mode).all()
@@ -113,7 +114,9 @@ def test_limited_pd_at_ten_milliseconds_only_swings(ran: dict[str, Result]) -> N
 def test_study_agrees_with_the_equations_of_motion(ran: dict[str, Result]) -> None:
     """The PD asked at every instant, on two coordinates, by an error-controlled integrator."""
     result = ran["free 150"]
-    leg, path, law = result.scenario.leg, result.scenario.path, Pd(kp=150.0, kd=5.0)
+    leg = result.scenario.leg
+    path = result.scenario.path
+    law = Pd(kp=150.0, kd=5.0)
     still = np.zeros(2)
 
     def torque(t: float, theta: Array, theta_dot: Array) -> Array:
@@ -123,11 +126,14 @@ def test_study_agrees_with_the_equations_of_motion(ran: dict[str, Result]) -> No
         reference = Reference(foot, still, still, wanted, still, still, still, 0.0)
         return law.command(leg, Servo(), Observation(t, theta, theta_dot), reference)
 
-    theta, rate, feet = kinematics.inverse(leg, path.at(0.0).position), still, []
+    theta = kinematics.inverse(leg, path.at(0.0).position)
+    rate = still
+    feet = []
     for line in range(2):  # one by one: the reference has a kink at the corner
         time = line + np.linspace(0.0, 1.0, 101)
         motion = dynamics.integrate(leg, theta, rate, time, torque, rtol=1e-7, atol=1e-8)
-        theta, rate = motion.theta[-1], motion.theta_dot[-1]
+        theta = motion.theta[-1]
+        rate = motion.theta_dot[-1]
         feet.append(kinematics.forward(leg, motion.theta[1:]))
     simulated = np.stack([result.record[f"foot_{axis}"][9:2000:10] for axis in "xz"], axis=-1)
     off = np.hypot(*(np.concatenate(feet) - simulated).T)

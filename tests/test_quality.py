@@ -67,7 +67,8 @@ def test_axes_are_orthogonal_and_make_up_J(
 def test_power_makes_the_two_ellipses_reciprocal(batch: tuple[int, ...]) -> None:
     """Along each axis: speed per motor rate times force per torque is 1."""
     theta = sample(RIGID, batch)[1]
-    v, f = quality.velocity_ellipse(RIGID, theta), quality.force_ellipse(RIGID, theta)
+    v = quality.velocity_ellipse(RIGID, theta)
+    f = quality.force_ellipse(RIGID, theta)
     np.testing.assert_array_equal(v.directions, f.directions)
     np.testing.assert_allclose(v.semi_axes * f.semi_axes, 1.0, rtol=1e-15)
 
@@ -76,7 +77,8 @@ def test_unit_circles_map_onto_the_ellipses() -> None:
     circle = unit(np.linspace(0.0, 2.0 * np.pi, 721))
     theta = sample(RIGID, (20,))[1]
     J = kinematics.jacobian(RIGID, theta)
-    v, f = quality.velocity_ellipse(RIGID, theta), quality.force_ellipse(RIGID, theta)
+    v = quality.velocity_ellipse(RIGID, theta)
+    f = quality.force_ellipse(RIGID, theta)
     images = (
         (v, np.einsum("nij,kj->nki", J, circle)),
         (
@@ -101,7 +103,8 @@ def test_transmission_angles_make_up_the_determinant(rng: np.random.Generator) -
         B, D = kinematics.knees(leg, theta)
         d = lengths(D - B)
         theta = theta[(d > 1.01 * abs(leg.L2 - leg.L3)) & (d < 0.99 * (leg.L2 + leg.L3))]
-        mu, rho = quality.transmission_angles(leg, theta, 1), np.hypot(*leg.foot_offset)
+        mu = quality.transmission_angles(leg, theta, 1)
+        rho = np.hypot(*leg.foot_offset)
         sines = np.sin(mu.B) * np.sin(mu.D) / np.sin(mu.C)
         det = quality.manipulability(leg, theta, 1)
         np.testing.assert_allclose(
@@ -116,8 +119,10 @@ def test_transmission_angles_make_up_the_determinant(rng: np.random.Generator) -
 def test_transmission_angles_are_those_of_the_triangles() -> None:
     """By the law of cosines, from the lengths of AF, EC and BD."""
     theta = sample(RIGID, (50,))[1]
-    (A, E), p = kinematics.bases(RIGID), kinematics.closed_points(RIGID, theta)
-    mu, rho = quality.transmission_angles(RIGID, theta), float(np.hypot(*RIGID.foot_offset))
+    A, E = kinematics.bases(RIGID)
+    p = kinematics.closed_points(RIGID, theta)
+    mu = quality.transmission_angles(RIGID, theta)
+    rho = float(np.hypot(*RIGID.foot_offset))
     triangles = (
         (mu.B, RIGID.L1, rho, p.F - A),
         (mu.C, RIGID.L2, RIGID.L3, p.D - p.B),
@@ -134,7 +139,8 @@ def test_transmission_angles_are_those_of_the_triangles() -> None:
 @pytest.mark.parametrize("assembly", [-1, 1])
 @pytest.mark.parametrize("mode", MODES)
 def test_determinant_is_that_of_the_slopes(mode: Mode, assembly: int) -> None:
-    theta, h = sample(RIGID, (30,), mode, assembly)[1], 1e-6
+    theta = sample(RIGID, (30,), mode, assembly)[1]
+    h = 1e-6
     steps = [kinematics.forward(RIGID, theta + h * e, assembly) for e in (*np.eye(2), *-np.eye(2))]
     slopes = cross(steps[0] - steps[2], steps[1] - steps[3]) / (2.0 * h) ** 2
     det = quality.determinant(RIGID, theta, assembly)
@@ -159,7 +165,9 @@ def test_batch_is_a_plain_loop_to_the_last_bit() -> None:
 def test_near_the_flat_loop_the_small_axis_keeps_its_digits() -> None:
     """J's own rounding is 1e-8 of s_2 there; J^-1, link by link, has no large number in it."""
     leg = FiveBar(0.25, 0.5, 0.625, 0.375, 0.75)
-    far, near = 0.0, 0.5 * np.pi  # -theta_E: |BD| falls from 1.33 m to 1.09 m
+    # -theta_E: |BD| falls from 1.33 m to 1.09 m
+    far = 0.0
+    near = 0.5 * np.pi
     for _ in range(60):
         middle = 0.5 * (far + near)
         B, D = kinematics.knees(leg, np.array([2.5, -middle]))
@@ -167,8 +175,10 @@ def test_near_the_flat_loop_the_small_axis_keeps_its_digits() -> None:
     theta = np.array([2.5, -near])
     s = quality.velocity_ellipse(leg, theta).semi_axes
     assert s[0] > 1e6
-    (A, E), p = kinematics.bases(leg), kinematics.closed_points(leg, theta)
-    BC, DC = p.C_left - p.B, p.C_right - p.D
+    A, E = kinematics.bases(leg)
+    p = kinematics.closed_points(leg, theta)
+    BC = p.C_left - p.B
+    DC = p.C_right - p.D
     inverse = np.stack([BC / cross(p.B - A, BC), DC / cross(p.D - E, DC)])
     largest = np.linalg.svd(inverse, compute_uv=False)[0]
     np.testing.assert_allclose(s[1], 1.0 / largest, rtol=1e-13)

@@ -26,7 +26,8 @@ COLUMNS = (
     "time target_x target_z foot_x foot_z theta_A theta_B theta_E theta_D theta_dot_A theta_dot_B "
     "theta_dot_E theta_dot_D ctrl_A ctrl_E torque_A torque_E gap"
 ).split()
-HIP, GROUND = ["hip_z", "hip_dot_z"], ["ground_x", "ground_z"]
+HIP = ["hip_z", "hip_dot_z"]
+GROUND = ["ground_x", "ground_z"]
 GAIT = "path={kind='gait', centre=[0, -0.07], stride=0.02, lift=0.01, frequency=4, ramp=0.1}"
 SCENES = {
     "air": ["scene=air"],
@@ -81,7 +82,8 @@ def test_columns_of_every_scene(kind: str, more: list[str]) -> None:
 def test_columns_are_the_states(kind: str) -> None:
     plan, result = done(kind)
     states = simulate(plan.model, plan.start[None], plan.ctrl[None])
-    leg, q = plan.scenario.leg, states.qpos[0, :, -4:]
+    leg = plan.scenario.leg
+    q = states.qpos[0, :, -4:]
     for i, joint in enumerate("ABED"):
         np.testing.assert_array_equal(result.record[f"theta_{joint}"], q[:, i])
         rate = states.qvel[0, :, states.qvel.shape[-1] - 4 + i]
@@ -137,7 +139,8 @@ def test_load_in_stance_is_that_of_the_steps_with_ground_force() -> None:
 
 def test_load_in_stance_without_a_ground_is_that_of_the_plan() -> None:
     plan, result = done("air", GAIT)
-    window, h = plan.scenario.window, 1e-3
+    window = plan.scenario.window
+    h = 1e-3
     cycle = ((np.arange(600) * h - 0.05) * 4 + 0.25) % 1.0  # half its ramp of 0.1 s late
     tau = pair(result, "torque")[window]
     rms = np.sqrt(np.mean(tau[(cycle < 0.5 - 1e-9)[window]] ** 2, axis=0))
@@ -227,7 +230,8 @@ def test_resolved_scenario_runs_again_to_the_same_bits(shell: Shell, settings: l
     assert shell("run", "short.toml", "--out", "one", *changes).err == ""
     (shell.folder / "push.csv").unlink()
     assert shell("run", "one/scenario.toml", "--out", "two").status == 0
-    one, two = file_of(shell.folder / "one"), file_of(shell.folder / "two")
+    one = file_of(shell.folder / "one")
+    two = file_of(shell.folder / "two")
     assert list(one) == list(two)
     for name, column in one.items():
         np.testing.assert_array_equal(column, two[name], err_msg=name)

@@ -73,7 +73,8 @@ def layout_of(path: Path) -> tuple[list[str], list[str], dict[str, Any]]:
 def test_layout_and_identity_come_with_the_file(tmp_path: Path) -> None:
     path = written(tmp_path / "a.rrd", LEG, ellipse(LEG, 50))
     reader = RrdReader(path)
-    (data,), (layout,) = reader.recordings(), reader.blueprints()
+    (data,) = reader.recordings()
+    (layout,) = reader.blueprints()
     assert (data.application_id, data.recording_id) == ("fivebar", "round and round")
     assert layout.application_id == "fivebar"
     moving, static = read(path)

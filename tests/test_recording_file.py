@@ -70,7 +70,8 @@ def test_one_that_cannot_be_read_is_rebuilt(
     run: Path, content: str, damage: Callable[[Path], object]
 ) -> None:
     """Were it left as it is, its bytes would still be the damaged ones."""
-    own, names = run / "recording.rrd", set(os.listdir(run))
+    own = run / "recording.rrd"
+    names = set(os.listdir(run))
     damage(own)
     damaged = own.read_bytes() if own.exists() else None
     with recording_file.opened([run]) as file:
@@ -84,7 +85,8 @@ def test_one_that_cannot_be_read_is_rebuilt(
 def test_in_a_directory_one_may_not_write_in_it_is_temporary(
     run: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    content, make = digest(run / "recording.rrd"), tempfile.mkstemp
+    content = digest(run / "recording.rrd")
+    make = tempfile.mkstemp
     (run / "recording.rrd").write_bytes(b"old")
 
     def refuse(*args: object, dir: Path, **kwargs: object) -> tuple[int, str]:

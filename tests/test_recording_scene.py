@@ -17,7 +17,8 @@ SINGLE = float(np.finfo(np.float32).eps)
 def turned(quaternions: list[Any], vector: tuple[float, float, float]) -> Array:
     """Return a vector turned by quaternions (x, y, z, w), as v + 2 u x (u x v + w v)."""
     quaternion = np.array(quaternions, dtype=np.float64).reshape(-1, 4)
-    u, w = quaternion[:, :3], quaternion[:, 3:]
+    u = quaternion[:, :3]
+    w = quaternion[:, 3:]
     return np.array(vector) + 2.0 * np.cross(u, np.cross(u, vector) + w * np.array(vector))
 
 
@@ -25,10 +26,12 @@ def test_links_are_where_the_record_says(tmp_path: Path) -> None:
     record = ellipse(LEG, 101)
     moving, static = read(written(tmp_path / "a.rrd", LEG, record))
     q = np.stack([record[f"theta_{joint}"] for joint in "ABED"], axis=-1)[::10]
-    p, (A, E) = kinematics.chain_points(LEG, q), kinematics.bases(LEG)
+    p = kinematics.chain_points(LEG, q)
+    A, E = kinematics.bases(LEG)
     ends = {"L1": (A, p.B), "L2": (p.B, p.C_left), "L3": (p.D, p.C_right), "L4": (E, p.D)}
     for name, (inner, outer) in ends.items():
-        pose, bar = moving[f"/hip/{name}"], static[f"/hip/{name}"]
+        pose = moving[f"/hip/{name}"]
+        bar = static[f"/hip/{name}"]
         origin = np.array(pose["Transform3D:translation"])[:, 0]
         # a capsule lies along z of its own frame; that frame is turned within the link's
         along = turned(bar["Capsules3D:quaternions"][0], (0.0, 0.0, 1.0))
@@ -47,7 +50,8 @@ def test_foot_target_and_trail_are_where_the_record_says(tmp_path: Path) -> None
     moving, static = read(written(tmp_path / "a.rrd", LEG, record))
     foot = np.stack([record["foot_x"], record["foot_z"]], axis=-1)[::10]
     target = np.stack([record["target_x"], record["target_z"]], axis=-1)
-    L2, ball = moving["/hip/L2"], static["/hip/L2/foot"]
+    L2 = moving["/hip/L2"]
+    ball = static["/hip/L2/foot"]
     offset = tuple(ball["Ellipsoids3D:centers"][0][0])
     drawn = np.array(L2["Transform3D:translation"])[:, 0] + turned(
         L2["Transform3D:quaternion"], offset
@@ -71,7 +75,8 @@ def test_links_are_as_long_and_thick_as_the_leg(tmp_path: Path) -> None:
     for name in lengths:
         assert static[f"/hip/{name}"]["Capsules3D:radii"] == [[np.float32(LEG.radius)]]
     # the extension starts at C and ends at the foot
-    L2, foot = static["/hip/L2"], static["/hip/L2/foot"]
+    L2 = static["/hip/L2"]
+    foot = static["/hip/L2/foot"]
     start = np.array(L2["Capsules3D:translations"][0][1])
     along = turned(L2["Capsules3D:quaternions"][0][1], (0.0, 0.0, 1.0))[0]
     F = start + LEG.L6 * along - foot["Ellipsoids3D:centers"][0][0]
@@ -82,7 +87,8 @@ def test_links_are_as_long_and_thick_as_the_leg(tmp_path: Path) -> None:
 def test_ground_is_where_the_record_says(tmp_path: Path) -> None:
     record = standing(ellipse(LEG, 401))
     moving, static = read(written(tmp_path / "a.rrd", LEG, record))
-    rows, lift = slice(None, None, 10), record["hip_z"][::10]
+    rows = slice(None, None, 10)
+    lift = record["hip_z"][::10]
     hip = np.array(moving["/hip"]["Transform3D:translation"])[:, 0]
     np.testing.assert_array_equal(hip[:, [0, 1]], 0.0)
     np.testing.assert_array_equal(hip[:, 2], lift.astype(np.float32))
@@ -100,7 +106,8 @@ def test_ground_is_where_the_record_says(tmp_path: Path) -> None:
     contact = (record["foot_z"][rows] + lift - LEG.foot_radius)[down]
     np.testing.assert_allclose(origins[:, 2], contact, rtol=0, atol=SINGLE)
     floor = static["/floor"]
-    (centre,), (half,) = floor["Boxes3D:centers"][0], floor["Boxes3D:half_sizes"][0]
+    (centre,) = floor["Boxes3D:centers"][0]
+    (half,) = floor["Boxes3D:half_sizes"][0]
     assert centre[2] + half[2] == 0.0
     assert centre[0] - half[0] < trail[:, 0].min() < trail[:, 0].max() < centre[0] + half[0]
 

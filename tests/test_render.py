@@ -37,8 +37,11 @@ SCENES = {
     "rail": {"kind": "rail"},
     "treadmill": {"kind": "treadmill", "speed": 0.1},
 }
-PRESETS, OTHERS = resources.shipped("models/legs"), ("q8bot", "minitaur")
-BLUE, ORANGE = (0, 2), (2, 0)  # the stronger and the weaker channel of the links' colours
+PRESETS = resources.shipped("models/legs")
+OTHERS = ("q8bot", "minitaur")
+# the stronger and the weaker channel of the links' colours
+BLUE = (0, 2)
+ORANGE = (2, 0)
 
 
 @pytest.fixture(scope="session")
@@ -82,9 +85,11 @@ def posed(leg: FiveBar, scene: str = "air", steps: int = 500) -> Replay:
 
 def pixel(drawn: render.Stage, point: np.ndarray, size: tuple[int, int]) -> tuple[int, int]:
     """Return (row, column) of a point (x, z) [m], by a pinhole camera of its own."""
-    camera, (width, height) = drawn.camera, size
+    camera = drawn.camera
+    width, height = size
     ray = np.array([point[0], 0.0, point[1]]) - camera.eye
-    right, forward = np.array([1.0, 0.0, 0.0]), camera.forward
+    right = np.array([1.0, 0.0, 0.0])
+    forward = camera.forward
     scale = 0.5 * height / np.tan(np.radians(0.5 * camera.field)) / (ray @ forward)
     up = np.cross(right, forward)
     return round(0.5 * height - scale * (ray @ up)), round(0.5 * width + scale * (ray @ right))
@@ -92,7 +97,8 @@ def pixel(drawn: render.Stage, point: np.ndarray, size: tuple[int, int]) -> tupl
 
 def is_link(frame: render.Frame, channels: tuple[int, int]) -> np.ndarray:
     """Return where the colour of a side's links is."""
-    weak, strong = frame[..., channels[0]].astype(int), frame[..., channels[1]].astype(int)
+    weak = frame[..., channels[0]].astype(int)
+    strong = frame[..., channels[1]].astype(int)
     return strong - weak > 90
 
 
@@ -103,7 +109,8 @@ def is_link(frame: render.Frame, channels: tuple[int, int]) -> np.ndarray:
     [(name, scene) for name in PRESETS for scene in SCENES if scene == "air" or name in OTHERS],
 )
 def test_links_and_target_are_where_kinematics_has_them(name: str, scene: str) -> None:
-    leg, size = FiveBar.load(name), (200, 150)
+    leg = FiveBar.load(name)
+    size = (200, 150)
     shown = posed(leg, scene)
     points = kinematics.chain_points(leg, kinematics.home(leg))
     A, E = kinematics.bases(leg)
@@ -129,7 +136,8 @@ def test_links_and_target_are_where_kinematics_has_them(name: str, scene: str) -
 
 @pytest.mark.usefixtures("drawing")
 def test_ground_pushes_the_foot_with_an_arrow() -> None:
-    leg, size = FiveBar.load("classic"), (200, 150)
+    leg = FiveBar.load("classic")
+    size = (200, 150)
     shown = posed(leg, "rail")
     half_way = kinematics.chain_points(leg, kinematics.home(leg)).F
     half_way = half_way + np.array([0.0, shown.hip[0] + 0.3 * leg.size])

@@ -26,7 +26,8 @@ from fivebar_sim.scenario import Scenario
 AIR = ["foot-path", "leg-moments", "tracking-error", "load-share", "torque", "loop-gap"]
 GROUNDED = [*AIR[:-1], "ground", "loop-gap"]
 OVERLAID = ["foot-path", "torque", "tracking-error", "loop-gap", "load-share", "ground"]
-APART, MISSING = ("verdict", "limits", "provenance"), object()
+APART = ("verdict", "limits", "provenance")
+MISSING = object()
 EVIL = "<script>alert('1')</script> &amp; $x$"
 
 
@@ -63,7 +64,8 @@ def test_a_page_is_whole_and_says_its_verdict(
     runs: dict[str, Path], pages: dict[str, Page]
 ) -> None:
     for name, path in runs.items():
-        run, page = stored.read(path), pages[name]
+        run = stored.read(path)
+        page = pages[name]
         assert page.all("html")[0].attributes["lang"] == "en"
         assert page.all("title")[0].text == [f"{run.scenario.name}: {run.metrics['verdict']}"]
         (word,) = (e for e in page.all("span") if "verdict" in e.attributes.get("class", ""))
@@ -90,7 +92,8 @@ def test_every_limit_is_there_with_value_and_verdict(
 ) -> None:
     seen = set()
     for name, path in runs.items():
-        run, rows = stored.read(path), pages[name].rows()
+        run = stored.read(path)
+        rows = pages[name].rows()
         for limit in judge(run.metrics, run.scenario.limits):
             word = "pass" if limit.ok else "FAIL"
             seen.add(word)
@@ -145,7 +148,8 @@ def test_nothing_is_loaded_run_or_let_through(pages: dict[str, Page]) -> None:
 
 
 def test_comparison_tells_runs_apart(runs: dict[str, Path], pages: dict[str, Page]) -> None:
-    page, rows = pages["all"], pages["all"].rows()
+    page = pages["all"]
+    rows = pages["all"].rows()
     assert page.ids("figure") == OVERLAID
     assert rows[0] == ["metric", *runs]
     assert rows[1] == ["verdict", "FAIL", "FAIL", "pass"]

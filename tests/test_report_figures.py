@@ -74,7 +74,8 @@ def test_a_limit_is_drawn_where_it_is_near(
 
 def test_figures_show_the_record(ellipse: StoredRun) -> None:
     """Foot and target, error, RMS and percentile, peak: all in the figure's units."""
-    record, window = ellipse.record, ellipse.scenario.window
+    record = ellipse.record
+    window = ellipse.scenario.window
     error = np.hypot(record["foot_x"] - record["target_x"], record["foot_z"] - record["target_z"])
     with look.styled():
         path, tracking, torque = (

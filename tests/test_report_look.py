@@ -25,7 +25,8 @@ def test_envelope_keeps_what_sticks_out(values: np.ndarray, bins: int) -> None:
     rows = draw.envelope(values, bins)
     assert (np.diff(rows) > 0).all()
     assert (rows[0], rows[-1]) == (0, len(values) - 1)
-    kept, gap = values[rows], np.isnan(values)
+    kept = values[rows]
+    gap = np.isnan(values)
     # no gap is bridged, none is made: runs of NaN stay as many
     assert np.count_nonzero(np.diff(np.isnan(kept))) == np.count_nonzero(np.diff(gap))
     edge = np.flatnonzero(np.diff(gap))
@@ -36,7 +37,8 @@ def test_envelope_keeps_what_sticks_out(values: np.ndarray, bins: int) -> None:
     assert len(rows) <= 2 * bins + 2 + 2 * np.count_nonzero(np.diff(gap))
     ends = np.linspace(0, len(values), bins + 1).astype(int)
     for start, stop in pairwise(ends):
-        part, drawn = values[start:stop], kept[(rows >= start) & (rows < stop)]
+        part = values[start:stop]
+        drawn = kept[(rows >= start) & (rows < stop)]
         if not np.isnan(part).all():
             assert (np.nanmin(drawn), np.nanmax(drawn)) == (np.nanmin(part), np.nanmax(part))
 
@@ -99,7 +101,8 @@ def test_svg_of_two_figures_in_one_page() -> None:
 
 
 def test_shading_of_stance_is_where_the_foot_stands() -> None:
-    time, down = np.arange(1.0, 6001.0), np.zeros(6000, dtype=bool)
+    time = np.arange(1.0, 6001.0)
+    down = np.zeros(6000, dtype=bool)
     down[1000:2000] = down[5999] = True
     with look.styled():
         _, (ax,) = draw.panels(1, height=2.0)

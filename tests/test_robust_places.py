@@ -44,7 +44,8 @@ def test_two_runs_at_once_leave_one_whole_run(shell: Shell) -> None:
 
 
 def test_many_writers_of_one_place_all_end_well(tmp_path: Path, results: list[Result]) -> None:
-    place, errors = tmp_path / "mine", list[BaseException]()
+    place = tmp_path / "mine"
+    errors = list[BaseException]()
 
     def write(result: Result) -> None:
         try:
@@ -68,7 +69,9 @@ def test_many_writers_of_one_place_all_end_well(tmp_path: Path, results: list[Re
 def test_a_place_taken_in_between_is_exchanged_anew(
     tmp_path: Path, results: list[Result], monkeypatch: pytest.MonkeyPatch, there: bool
 ) -> None:
-    place, rename, overtaken = tmp_path / "mine", Path.rename, []
+    place = tmp_path / "mine"
+    rename = Path.rename
+    overtaken = []
     if there:
         results[0].write(place)
 
@@ -108,7 +111,8 @@ def test_what_a_killed_run_left_is_swept_by_the_next_one(
 ) -> None:
     left = [".mine.abcdefgh.partial", ".mine.a_cdefg0.old"]
     others = [".mine.x.partial", ".other.abcdefgh.partial", "mine.abcdefgh.partial", ".mine.new"]
-    fresh, held = ".mine.freshone.partial", ".mine.heldhere.partial"
+    fresh = ".mine.freshone.partial"
+    held = ".mine.heldhere.partial"
     for name in (*left, *others, fresh, held):
         (tmp_path / name).mkdir()
         (tmp_path / name / "rollout.parquet").touch()

@@ -52,7 +52,8 @@ def target(result: Result) -> Array:
 
 @pytest.mark.parametrize("integrator", INTEGRATORS)
 def test_oracle_tracking_of_the_plain_servo(integrator: str) -> None:
-    result, true = ellipse(f"sim.integrator={integrator}"), truth()
+    result = ellipse(f"sim.integrator={integrator}")
+    true = truth()
     window = result.scenario.window
     error = rms((true.foot - target(result))[window])
     assert error == pytest.approx(1.19e-3, rel=0.01)
@@ -67,7 +68,8 @@ def test_oracle_tracking_of_the_plain_servo(integrator: str) -> None:
 def test_oracle_torque_rms(integrator: str, feedforward: str) -> None:
     result = ellipse(f"sim.integrator={integrator}", f"controller.feedforward={feedforward}")
     window = result.scenario.window
-    true, ours = truth(feedforward).tau[window], column_pair(result, "torque")[window]
+    true = truth(feedforward).tau[window]
+    ours = column_pair(result, "torque")[window]
     for i, motor in enumerate(MOTORS):
         size = rms(true[:, i])
         assert result.metrics["load"]["torque_rms"][motor] == pytest.approx(size, rel=0.01)
@@ -80,7 +82,8 @@ def test_velocity_feedforward_leaves_tau_over_kp() -> None:
     assert result.metrics["tracking"]["rms"] < 20e-6
     # what remains is the spring's own deflection: foot error = J tau / kp
     window = result.scenario.window
-    theta, tau = column_pair(result, "theta")[window], column_pair(result, "torque")[window]
+    theta = column_pair(result, "theta")[window]
+    tau = column_pair(result, "torque")[window]
     J = kinematics.jacobian(result.scenario.leg, theta)
     sag = np.einsum("nij,nj->ni", J, tau) / result.scenario.servo.kp
     left = (target(result) - foot(result))[window]
@@ -152,7 +155,8 @@ def test_share_of_a_mirrored_leg_is_mirrored() -> None:
 
 def test_record_is_consistent() -> None:
     result = ellipse()
-    record, leg = result.record, result.scenario.leg
+    record = result.record
+    leg = result.scenario.leg
     assert all(column.shape == (4000,) and column.dtype == np.float64 for column in record.values())
     np.testing.assert_array_equal(record["time"], np.arange(1, 4001) * 0.001)
     q = np.stack([record[f"theta_{joint}"] for joint in "ABED"], axis=-1)

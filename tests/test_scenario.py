@@ -95,7 +95,8 @@ def test_window_is_whole_periods_after_the_ramp(
     loaded = scenario(
         tmp_path, f"sim.timestep={timestep}", f"path.ramp={ramp}", f"duration={duration}"
     )
-    rows, period = loaded.window, 0.25
+    rows = loaded.window
+    period = 0.25
     time = (np.arange(loaded.steps) + 1) * timestep
     assert np.all(time[rows] > ramp - timestep / 2)
     periods = math.floor((duration - ramp) / period + 1e-9)
@@ -131,7 +132,8 @@ def test_resolved_table_gives_the_same_run(tmp_path: Path, name: str) -> None:
         assert Path(again.path.file) == folder / str(copied_name(first.path))
         again = msgspec.structs.replace(again, path=first.path)
     assert again == first
-    one, two = rollout.run(first), rollout.run(Scenario.load(folder / "scenario.toml"))
+    one = rollout.run(first)
+    two = rollout.run(Scenario.load(folder / "scenario.toml"))
     for column in one.record:
         np.testing.assert_array_equal(two.record[column], one.record[column])
     assert two.metrics == one.metrics

@@ -22,7 +22,8 @@ from fivebar_sim.scenario.scenes import Air, Ground, Payload, Rail, Scene, Tread
 
 FILES = sorted((resources.folder("models") / "scenes").glob("*.xml"))
 INTEGRATORS: tuple[Integrator, ...] = get_args(Integrator)
-CLASSIC, ODD = FiveBar.load("classic"), FiveBar.load("extended")
+CLASSIC = FiveBar.load("classic")
+ODD = FiveBar.load("extended")
 HANGING = [
     leg
     for leg in (FiveBar.load(name) for name in resources.shipped("models/legs"))
@@ -111,7 +112,8 @@ def test_every_scene_has_its_file_and_every_file_its_scene() -> None:
 
 @pytest.mark.parametrize("file", FILES, ids=lambda file: file.stem)
 def test_file_loads_alone_and_is_the_classic_leg(file: Any) -> None:
-    mj, leg = loaded(file), loaded(resources.folder("models") / "leg.xml")
+    mj = loaded(file)
+    leg = loaded(resources.folder("models") / "leg.xml")
     assert {n: str(v) for n, v in options(mj).items()} == {
         n: str(v) for n, v in options(leg).items()
     }
@@ -185,7 +187,8 @@ def test_air_gives_the_bits_of_the_leg_alone(integrator: Integrator) -> None:
 def test_home_is_closed_and_on_the_floor(leg: FiveBar, scene: Scene) -> None:
     mj = model.build(leg, scene=scene)
     data = at(mj, "home")
-    home, height = kinematics.home(leg), float(data.site("hip").xpos[2])
+    home = kinematics.home(leg)
+    height = float(data.site("hip").xpos[2])
     assert gap(data) < 1e-14 * leg.size / 0.1
     np.testing.assert_array_equal(data.qpos[-4:], home)
     np.testing.assert_array_equal(data.ctrl, [*[0.0] * (mj.nu - 2), home[0], home[2]])

@@ -73,9 +73,12 @@ def steps(mj: mujoco.MjModel, start: Array, ctrl: Array) -> tuple[Array, ...]:
     q_next, v_next, force, sensor = (out[name][0] for name in record)
     q = np.concatenate([start[None], q_next[:-1]])
     v = np.concatenate([np.zeros((1, 4)), v_next[:-1]])
-    data, M, needed = mujoco.MjData(mj), np.zeros((4, 4)), np.empty_like(v)
+    data = mujoco.MjData(mj)
+    M = np.zeros((4, 4))
+    needed = np.empty_like(v)
     for k in range(len(v)):
-        data.qpos[:], data.qvel[:] = q[k], v[k]
+        data.qpos[:] = q[k]
+        data.qvel[:] = v[k]
         mujoco.mj_forward(mj, data)
         mujoco.mj_fullM(mj, data, M)
         needed[k] = M @ (v_next[k] - v[k]) / H + data.qfrc_bias - force[k]
@@ -105,7 +108,8 @@ def test_torque_balances_momentum(name: str, integrator: Integrator, drive: Driv
 
 @each_drive
 def test_damping_is_what_a_velocity_feedforward_cancels(drive: Drive) -> None:
-    zero, rate = np.zeros(2), np.array([0.3, -0.2])
+    zero = np.zeros(2)
+    rate = np.array([0.3, -0.2])
     lost = applied_torque(LINE, "implicitfast", zero, zero, zero, zero, rate, drive)
     gain = LINE.damping if drive == "position" else LINE.back_emf
     np.testing.assert_allclose(lost, -gain * rate, rtol=1e-12)
@@ -164,7 +168,8 @@ def test_stalled_motor_gives_its_limit(name: str, integrator: Integrator, drive:
 @each_integrator
 def test_friction_holds_what_is_below_it(integrator: Integrator) -> None:
     servo = Servo(limit=1.0, friction=0.01)
-    moved, mj = [], lone_motors(servo, integrator, "torque", 1e-4)
+    moved = []
+    mj = lone_motors(servo, integrator, "torque", 1e-4)
     for torque in (0.009, 0.011):
         data = mujoco.MjData(mj)
         start = data.qpos.copy()
@@ -179,7 +184,8 @@ def test_friction_holds_what_is_below_it(integrator: Integrator) -> None:
 
 
 TIMESTEPS = st.sampled_from([2.5e-4, 1e-3, 2e-3])
-RATES, DELAYS = st.none() | st.floats(1.0, 500.0), st.floats(0.0, 0.05)
+RATES = st.none() | st.floats(1.0, 500.0)
+DELAYS = st.floats(0.0, 0.05)
 BUSES = st.builds(Servo, rate=RATES, delay=DELAYS, resolution=st.sampled_from([0.0, 1e-3, 0.3]))
 
 
@@ -197,14 +203,16 @@ def test_commands_arrive_late_and_hold(servo: Servo, timestep: float, count: int
 @given(servo=BUSES, timestep=TIMESTEPS, seed=st.integers(0, 99), k=st.integers(0, 79))
 def test_what_is_sent_is_causal(servo: Servo, timestep: float, seed: int, k: int) -> None:
     rng = np.random.default_rng(seed)
-    table, rest = rng.standard_normal((3, 80, 2)), rng.standard_normal((3, 2))
+    table = rng.standard_normal((3, 80, 2))
+    rest = rng.standard_normal((3, 2))
     changed = table.copy()
     changed[:, k] += 1.0
     one, other = (servo.sent(each, rest, timestep) for each in (table, changed))
     assert one.shape == table.shape
     np.testing.assert_array_equal(one[:, :k], other[:, :k])
     np.testing.assert_array_equal(one[1], servo.sent(table[1], rest[1], timestep))
-    raw, row = servo.sent(table, rest, timestep, "torque"), servo.latched(80, timestep)
+    raw = servo.sent(table, rest, timestep, "torque")
+    row = servo.latched(80, timestep)
     np.testing.assert_array_equal(one, servo.rounded(raw))  # torques are not
     for j in range(80):
         np.testing.assert_array_equal(raw[:, j], rest if row[j] < 0 else table[:, row[j]])

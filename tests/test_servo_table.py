@@ -49,7 +49,8 @@ def closed(leg: FiveBar, foot: Array) -> Array:
     """Return the angles of those points that the leg reaches in its mode and assembly."""
     theta = kinematics.inverse_all(leg, foot)[:, MODES.index(leg.mode)]
     ok = np.isfinite(theta[:, 0])
-    foot, theta = foot[ok], theta[ok]
+    foot = foot[ok]
+    theta = theta[ok]
     right = kinematics.branch(leg, points_at(leg, foot, theta)).assembly == leg.assembly
     return theta[right]
 
@@ -78,7 +79,10 @@ def test_joint_angles_of_servo_angles_are_half_a_step_off(
 
 
 def test_rounding_error_is_within_its_bound_over_random_legs() -> None:
-    rng, ratio, over_first, seen = np.random.default_rng(11), 0.0, 0.0, 0
+    rng = np.random.default_rng(11)
+    ratio = 0.0
+    over_first = 0.0
+    seen = 0
     for _ in range(300):
         leg = random_leg(rng)
         theta = closed(leg, rng.uniform(-1.0, 1.0, (300, 2)) * leg.size)
@@ -121,7 +125,8 @@ def test_whole_degrees_on_the_classic_leg() -> None:
 
 
 def test_bound_to_first_order_is_the_jacobian_times_half_a_degree() -> None:
-    theta, step = sample(RIGID, (20,))[1], 1e-6
+    theta = sample(RIGID, (20,))[1]
+    step = 1e-6
     slopes = [
         (kinematics.forward(RIGID, theta + e) - kinematics.forward(RIGID, theta - e)) / (2.0 * step)
         for e in step * np.eye(2)
@@ -212,7 +217,8 @@ def test_bound_is_infinite_where_rounding_may_straighten_the_lower_links() -> No
 
 def test_beyond_the_range_names_index_and_both_units() -> None:
     theta = np.full((2, 3, 2), np.radians([-130.0, -50.0]))
-    theta[1, 0, 1], theta[1, 2, 0] = np.radians(50.0), np.radians(100.0)
+    theta[1, 0, 1] = np.radians(50.0)
+    theta[1, 2, 0] = np.radians(100.0)
     with pytest.raises(
         UnreachableError,
         match=r"^2 of 6 poses are .* at E must be in \[0, 180\] deg "

@@ -168,7 +168,9 @@ def test_signal_at_any_moment_ends_the_program(
     """Status and output, at 75 moments of a run: after `main` has begun, and until it has ended."""
     (tmp_path / "short.toml").write_text(ELLIPSE, encoding="utf-8")
     command = [FIVEBAR, "run", "short.toml", "--quiet", "--out", "mine"]
-    begun, rng, came = time.monotonic(), random.Random(1), Counter[tuple[int, bytes, bool]]()
+    begun = time.monotonic()
+    rng = random.Random(1)
+    came = Counter[tuple[int, bytes, bool]]()
     subprocess.run(command, cwd=tmp_path, check=True)
     takes = time.monotonic() - begun
     for number in range(75):

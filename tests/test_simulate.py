@@ -27,7 +27,8 @@ def balance(plan: Plan) -> tuple[np.ndarray, np.ndarray]:
     M (v+ - v) / h + bias - constraint force, with M and bias at the start of the step, and the
     constraint force that the solver found in it.
     """
-    h, mj = plan.motion.timestep, plan.model
+    h = plan.motion.timestep
+    mj = plan.model
     batch = Batch(mj, 1, 1)
     batch.qpos = plan.motion.q[:1]
     out = batch.rollout(len(plan.ctrl), plan.ctrl[None], record=("qpos", "qvel", "qfrc_constraint"))
@@ -36,15 +37,19 @@ def balance(plan: Plan) -> tuple[np.ndarray, np.ndarray]:
         np.concatenate([first[None], rows[:-1]])
         for first, rows in ((plan.motion.q[0], q), (np.zeros(4), v))
     )
-    data, M, needed = mujoco.MjData(mj), np.zeros((4, 4)), np.empty_like(v)
+    data = mujoco.MjData(mj)
+    M = np.zeros((4, 4))
+    needed = np.empty_like(v)
     for k in range(len(v)):
-        data.qpos[:], data.qvel[:] = before_q[k], before_v[k]
+        data.qpos[:] = before_q[k]
+        data.qvel[:] = before_v[k]
         mujoco.mj_forward(mj, data)
         mujoco.mj_fullM(mj, data, M)
         needed[k] = M @ (v[k] - before_v[k]) / h + data.qfrc_bias - force[k]
     record = rollout.execute(plan).record
     torque = np.zeros_like(needed)
-    torque[:, 0], torque[:, 2] = record["torque_A"], record["torque_E"]
+    torque[:, 0] = record["torque_A"]
+    torque[:, 2] = record["torque_E"]
     return needed, torque
 
 
@@ -94,7 +99,8 @@ def test_batch_is_bit_identical_to_one_by_one() -> None:
 
 def test_batch_is_bit_identical_to_a_plain_loop() -> None:
     plan = planned("duration=1.0")
-    states, data = simulated(plan), mujoco.MjData(plan.model)
+    states = simulated(plan)
+    data = mujoco.MjData(plan.model)
     data.qpos[:] = plan.motion.q[0]
     for k, u in enumerate(plan.ctrl):
         data.ctrl[:] = u

@@ -127,7 +127,8 @@ def test_loop_closes_but_for_rounding_whatever_the_leg_measures(size: float) -> 
 @pytest.mark.parametrize("size", SIZES)
 def test_reach_ends_but_for_rounding_whatever_the_leg_measures(size: float) -> None:
     leg = scaled(LINE, size)
-    A, span = kinematics.bases(leg)[0], leg.L1 + leg.L2
+    A = kinematics.bases(leg)[0]
+    span = leg.L1 + leg.L2
     assert np.isfinite(kinematics.inverse_within(leg, A + span * AHEAD, [(-4.0, 4.0)] * 2)).all()
     for way in (AHEAD, -AHEAD):
         with pytest.raises(UnreachableError, match=r"\|AF\| must be in"):

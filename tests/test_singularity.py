@@ -69,9 +69,13 @@ def test_determinants_of_the_loop_equation(rng: np.random.Generator) -> None:
     for _ in range(200):
         leg = random_leg(rng)
         theta, assembly = random_poses(rng, leg, 50)
-        d, p = distances(leg, theta, assembly), kinematics.closed_points(leg, theta, assembly)
+        d = distances(leg, theta, assembly)
+        p = kinematics.closed_points(leg, theta, assembly)
         A, E = kinematics.bases(leg)
-        AB, ED, BC, DC = p.B - A, p.D - E, p.C_left - p.B, p.C_right - p.D
+        AB = p.B - A
+        ED = p.D - E
+        BC = p.C_left - p.B
+        DC = p.C_right - p.D
         det_x = np.linalg.det(np.stack([BC, DC], axis=-2))
         rounding = 1e-15 * (leg.size + leg.L5) ** 2
         np.testing.assert_allclose(det_x, d.loop * max(leg.L2, leg.L3), rtol=0, atol=rounding)
@@ -87,11 +91,13 @@ def test_distance_is_shorter_link_times_sine(rng: np.random.Generator) -> None:
     for _ in range(50):
         leg = random_leg(rng)
         theta, assembly = random_poses(rng, leg, 20)
-        d, p = distances(leg, theta, assembly), kinematics.closed_points(leg, theta, assembly)
+        d = distances(leg, theta, assembly)
+        p = kinematics.closed_points(leg, theta, assembly)
         A, E = kinematics.bases(leg)
         pairs = ((A, p.B, p.F), (E, p.D, p.C_right), (p.B, p.C_left, p.D))
         for each, (start, knee, end) in zip(d, pairs, strict=True):
-            a, b = start - knee, end - knee
+            a = start - knee
+            b = end - knee
             lines = [np.abs(cross(a, b)) / np.hypot(*v.T) for v in (a, b)]
             np.testing.assert_allclose(np.abs(each), np.min(lines, axis=0), rtol=0, atol=1e-15)
 
@@ -136,7 +142,8 @@ def test_signs_change_where_the_determinant_of_slopes_does(rng: np.random.Genera
 @pytest.mark.parametrize("leg", [RIGID, DYADIC, FiveBar(0.06, 0.03, 0.05, 0.02, 0.03)])
 def test_slope_at_zero_is_the_shorter_link(leg: FiveBar, turn: float) -> None:
     """With the angle past straight (turn 0) or folded (turn pi) as the parameter."""
-    h, bend = 1e-5, float(np.angle(complex(*leg.foot_offset)))
+    h = 1e-5
+    bend = float(np.angle(complex(*leg.foot_offset)))
 
     def at(angle: float) -> Distances:
         knees = np.array([0.4, turn + angle - bend, 1.0, turn + angle])
@@ -238,7 +245,8 @@ def test_knee_in_line_is_no_singularity_of_an_extended_foot() -> None:
     C = kinematics.bases(bare)[0] + 0.09 * unit(-0.6)  # |AC| = L1 + L2
     theta = kinematics.inverse(bare, C, (1, 1))
     assembly = int(kinematics.branch(bare, points_at(bare, C, theta)).assembly)
-    d, d_bare = distances(leg, theta, assembly), distances(bare, theta, assembly)
+    d = distances(leg, theta, assembly)
+    d_bare = distances(bare, theta, assembly)
     assert abs(d_bare.side_A) < 1e-7 < 0.01 < abs(d.side_A)
     assert abs(slope_determinant(bare, theta, assembly)) < 1e-8
     det = product(leg, d)

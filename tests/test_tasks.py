@@ -63,7 +63,8 @@ def test_every_part_of_an_observation_is_where_it_says(kind: str, rows: int) -> 
 
 @given(theta=st.tuples(st.floats(-0.3, 0.3), st.floats(-0.3, 0.3)))
 def test_foot_velocity_is_the_slope_of_the_foot(theta: tuple[float, float]) -> None:
-    home, step = kinematics.home(LEG)[::2] + theta, 1e-6
+    home = kinematics.home(LEG)[::2] + theta
+    step = 1e-6
     rate = np.array([3.0, -2.0])
 
     def pose(t: float) -> np.ndarray:
@@ -84,7 +85,8 @@ def test_reward_is_the_weighted_sum_of_its_terms(kind: str) -> None:
     weights = dict(zip(task.WEIGHTS, (2.0, -3.0, 5.0), strict=False))
     group = LegGroup(tasks.task(kind, weights=weights), [0, 1])
     group.reset([np.random.default_rng(i) for i in range(2)])
-    low, high = group.episodes.low, group.episodes.high
+    low = group.episodes.low
+    high = group.episodes.high
     for part in (0.3, 0.6):
         outcome = group.step(np.tile(low + part * (high - low), (2, 1)))
         assert list(outcome.terms) == list(task.WEIGHTS)
@@ -141,7 +143,8 @@ def test_masses_given_are_drawn_with_their_inertias() -> None:
 def test_stacked_legs_move_as_each_alone(lengths: list[float]) -> None:
     legs = [FiveBar(L2=length, L3=length) for length in lengths]
     q = np.stack([kinematics.home(leg) for leg in legs])
-    torque, sound = np.zeros((len(legs), 1, 2)), np.zeros(len(legs), bool)
+    torque = np.zeros((len(legs), 1, 2))
+    sound = np.zeros(len(legs), bool)
     together = motion(stacked(legs, 1), q, 0.5 + q, torque, sound)
     assert not together.reason.any()
     for row, leg in enumerate(legs):

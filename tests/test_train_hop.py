@@ -21,7 +21,8 @@ def script() -> dict[str, Any]:
 
 def test_search_finds_the_top_of_a_long_ridge(script: dict[str, Any]) -> None:
     """An ellipsoid of axes 1 to 1000, which needs C: steps of one length take 10^4 generations."""
-    scale, top = np.logspace(0.0, 3.0, 6), np.arange(6.0)
+    scale = np.logspace(0.0, 3.0, 6)
+    top = np.arange(6.0)
     search = script["Cma"](6, 12, 0.5, np.random.default_rng(0))
     for _ in range(400):
         x = search.ask()
@@ -42,5 +43,6 @@ def test_a_few_generations_hop_higher_and_again_alike(script: dict[str, Any]) ->
 
 def test_hop_path_is_the_scenarios(script: dict[str, Any]) -> None:
     rail = script["RAIL"]
-    played, record = script["on_path"](rail.servo), rollout.run(rail).record
+    played = script["on_path"](rail.servo)
+    record = rollout.run(rail).record
     np.testing.assert_array_equal(played.hip_z[:, 0], record["hip_z"])

@@ -72,7 +72,8 @@ def test_serial_torques_do_no_virtual_work_with_the_force(
     rng: np.random.Generator, batch: tuple[int, ...], belt: bool
 ) -> None:
     """With angles that the motors turn: the second is theta_A + theta_B with a belt."""
-    theta, force = angles(rng, batch, 1), rng.uniform(-10.0, 10.0, (*batch, 2))
+    theta = angles(rng, batch, 1)
+    force = rng.uniform(-10.0, 10.0, (*batch, 2))
     d_theta = rng.uniform(-1.0, 1.0, (*batch, 2))
     tau = LEG.static_torques(theta, force, belt=belt)
     d_motor = np.cumsum(d_theta, axis=-1) if belt else d_theta
@@ -100,7 +101,8 @@ def test_crouch_round_trips(knee: int) -> None:
 @pytest.mark.parametrize("knee", [-1, 1])
 @pytest.mark.parametrize("belt", [False, True])
 def test_crouch_torques_lift_the_load(knee: int, belt: bool) -> None:
-    leg, load = CrouchingLeg(CROUCH.l, knee), 20.0
+    leg = CrouchingLeg(CROUCH.l, knee)
+    load = 20.0
     q1 = leg.inverse(RISE)[:, 0]
     tau = leg.static_torques(q1, load, belt=belt)
     rates = leg.rates(q1, 0.3)
@@ -117,7 +119,8 @@ def test_crouch_torques_lift_the_load(knee: int, belt: bool) -> None:
 def test_serial_jacobian_is_the_slope(
     rng: np.random.Generator, batch: tuple[int, ...], knee: int
 ) -> None:
-    theta, step = angles(rng, batch, knee), 1e-5
+    theta = angles(rng, batch, knee)
+    step = 1e-5
     slopes = [LEG.forward(theta + step * e) - LEG.forward(theta - step * e) for e in np.eye(2)]
     J = LEG.jacobian(theta)
     assert J.shape == (*batch, 2, 2)
@@ -129,7 +132,8 @@ def test_serial_jacobian_is_the_slope(
 
 
 def test_crouch_jacobian_and_rates_are_slopes() -> None:
-    step, h = 1e-6, RISE[1:-1]
+    step = 1e-6
+    h = RISE[1:-1]
     q1 = CROUCH.inverse(h)[:, 0]
     slope = (CROUCH.forward(q1 + step) - CROUCH.forward(q1 - step)) / (2.0 * step)
     np.testing.assert_allclose(CROUCH.jacobian(q1), slope, rtol=0, atol=1e-10)
@@ -148,8 +152,10 @@ def test_belt_leg_is_a_parallelogram_of_five_bars(rng: np.random.Generator, knee
     There BD x BC = -AB x BF, so the assembly mode is the sign of the knee.
     """
     bars = FiveBar(LEG.L1, LEG.L2, LEG.L1, LEG.L2, 0.0)
-    theta, force = angles(rng, (40,), knee), rng.uniform(-10.0, 10.0, (40, 2))
-    motors, foot = np.cumsum(theta, axis=-1), LEG.forward(theta)
+    theta = angles(rng, (40,), knee)
+    force = rng.uniform(-10.0, 10.0, (40, 2))
+    motors = np.cumsum(theta, axis=-1)
+    foot = LEG.forward(theta)
     np.testing.assert_allclose(kinematics.forward(bars, motors, knee), foot, rtol=0, atol=1e-14)
     J_T = np.swapaxes(kinematics.jacobian(bars, motors, knee), -1, -2)
     tau = LEG.static_torques(theta, force, belt=True)
@@ -159,7 +165,8 @@ def test_belt_leg_is_a_parallelogram_of_five_bars(rng: np.random.Generator, knee
 @pytest.mark.parametrize("knee", [-1, 1])
 @pytest.mark.parametrize("belt", [False, True])
 def test_crouching_leg_is_a_serial_leg(knee: int, belt: bool) -> None:
-    crouch, serial = CrouchingLeg(0.05, knee), SerialLeg(0.05, 0.05, knee)
+    crouch = CrouchingLeg(0.05, knee)
+    serial = SerialLeg(0.05, 0.05, knee)
     q = crouch.inverse(RISE)
     theta = q - [0.5 * np.pi, 0.0]
     foot = np.stack([np.zeros(50), -RISE], axis=-1)
@@ -175,8 +182,10 @@ def test_crouching_leg_is_a_serial_leg(knee: int, belt: bool) -> None:
 
 
 def test_batch_is_a_plain_loop_to_the_last_bit(rng: np.random.Generator) -> None:
-    theta, force = angles(rng, (50,), 1), rng.uniform(-10.0, 10.0, (50, 2))
-    foot, tau = LEG.forward(theta), LEG.static_torques(theta, force)
+    theta = angles(rng, (50,), 1)
+    force = rng.uniform(-10.0, 10.0, (50, 2))
+    foot = LEG.forward(theta)
+    tau = LEG.static_torques(theta, force)
     np.testing.assert_array_equal(foot, [LEG.forward(t) for t in theta])
     np.testing.assert_array_equal(LEG.inverse(foot), [LEG.inverse(f) for f in foot])
     loop = [LEG.static_torques(t, f) for t, f in zip(theta, force, strict=True)]
@@ -267,7 +276,8 @@ def test_impossible_lengths_are_refused(bad: Any) -> None:
 
 
 def test_wrong_arguments_are_refused() -> None:
-    two, q = [0.1, -0.2], [0.1, 0.2, 0.3]
+    two = [0.1, -0.2]
+    q = [0.1, 0.2, 0.3]
     for call, message in (
         (lambda: SerialLeg(0.1, 0.1, 0), "knee must be -1 or 1"),
         (lambda: CrouchingLeg(0.1, 2), "knee must be -1 or 1"),

@@ -85,7 +85,8 @@ def test_squat_takes_the_references_torque(preset: str, integrator: Integrator) 
 
 def test_what_is_left_in_stance_is_the_soft_contact() -> None:
     key = Key("classic", "discrete", "velocity", 1.25e-4)
-    soft, hard = stance.measure(key), stance.measure(key, hard=True)
+    soft = stance.measure(key)
+    hard = stance.measure(key, hard=True)
     assert hard.depth < 0.02 * soft.depth
     assert hard.late < 0.5 * soft.late
     assert hard.force < 0.4 * soft.force
@@ -95,7 +96,8 @@ def test_what_is_left_in_stance_is_the_soft_contact() -> None:
 def test_side_force_creeps_less_without_slip() -> None:
     """The motors' torques differ by how the foot slides into place and creeps, under 3 N."""
     key = Key("classic", "discrete", "velocity", 1e-3)
-    plain, noslip = stance.grip(key, 0), stance.grip(key, 3)
+    plain = stance.grip(key, 0)
+    noslip = stance.grip(key, 3)
     assert noslip.creep < 0.5 * plain.creep < 0.15e-3
     assert noslip.error.late < 0.7 * plain.error.late < 0.1
     assert noslip.side_off < 0.11 * noslip.side

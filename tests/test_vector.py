@@ -48,14 +48,17 @@ def test_each_leg_has_the_bits_of_it_alone(kind: str, randomise: Randomise | Non
     alone = [LegEnv(kind, model_seed=3 + i, **options) for i in range(LEGS)]
     seen = legs.reset(seed=7)[0]
     np.testing.assert_array_equal(seen, [env.reset(seed=7 + i)[0] for i, env in enumerate(alone)])
-    random, over, ends = np.random.default_rng(0), [False] * LEGS, 0
+    random = np.random.default_rng(0)
+    over = [False] * LEGS
+    ends = 0
     for _ in range(100):
         chosen = random.uniform(legs.episodes.low, legs.episodes.high, legs.action_space.shape)
         seen, reward, terminated, truncated, info = legs.step(chosen)
         for i, env in enumerate(alone):
             row = (reward[i], terminated[i], truncated[i], str(info["reason"][i]))
             if over[i]:
-                observation, expected = env.reset()[0], (0.0, False, False, "")
+                observation = env.reset()[0]
+                expected = (0.0, False, False, "")
             else:
                 observation, *rest, more = env.step(chosen[i])
                 expected = (*rest, more["reason"])
@@ -91,7 +94,8 @@ def test_legs_are_alike_on_any_number_of_threads() -> None:
         legs = LegVectorEnv("hop", 7, nthread=threads, randomise=RANGES)
         row = legs.reset(seed=0)[0]
         random = np.random.default_rng(0)
-        low, high = legs.episodes.low, legs.episodes.high
+        low = legs.episodes.low
+        high = legs.episodes.high
         for _ in range(30):
             row = legs.step(random.uniform(low, high, (7, 2)))[0]
         seen.append(row)

@@ -25,8 +25,11 @@ class Window:
     """A viewer's handle that notes what it is shown, and is closed after some frames."""
 
     def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, frames: int) -> None:
-        self.model, self.data, self.frames = model, data, frames
-        self.cam, self.user_scn = mujoco.MjvCamera(), mujoco.MjvScene(model, 1000)
+        self.model = model
+        self.data = data
+        self.frames = frames
+        self.cam = mujoco.MjvCamera()
+        self.user_scn = mujoco.MjvScene(model, 1000)
         self.shown: list[tuple[float, np.ndarray, int]] = []
 
     def __enter__(self) -> Window:

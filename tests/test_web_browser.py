@@ -37,7 +37,8 @@ SOFTWARE = (  # draws without a graphics card, and looks for nothing by itself
 )
 PATIENCE = 120.0
 """How long the viewer may take to show the leg [s]: without a graphics card it takes about 20."""
-WIDE, HIGH = 800, 500
+WIDE = 800
+HIGH = 500
 ENOUGH = 100
 """Pixels that a link has at least."""
 
@@ -90,7 +91,8 @@ def test_the_leg_is_in_sight_and_nothing_leaves_the_machine(browser: str, tmp_pa
         page.on("websocket", lambda socket: asked.append(socket.url))
         page.goto(server.url)
         page.wait_for_selector("#the_canvas_id.visible", timeout=1e3 * PATIENCE)
-        end, seen = time.monotonic() + PATIENCE, [0]
+        end = time.monotonic() + PATIENCE
+        seen = [0]
         while min(seen) < ENOUGH and time.monotonic() < end:
             page.wait_for_timeout(300)
             picture = shot(page)

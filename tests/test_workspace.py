@@ -85,7 +85,8 @@ def search(leg: FiveBar, p: Array) -> Array:
         for radius in radii:
             if radius < 1e-9:
                 continue
-            angle, width = np.linspace(-np.pi, np.pi, 2001)[None, :], 2.0 * np.pi / 2000
+            angle = np.linspace(-np.pi, np.pi, 2001)[None, :]
+            width = 2.0 * np.pi / 2000
             for _ in range(4):
                 c = centre + radius * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
                 r = np.hypot(*np.moveaxis(c - other, -1, 0))
@@ -113,11 +114,13 @@ def length(v: Array) -> Array:
 @pytest.mark.parametrize("count", [50, pytest.param(334, marks=pytest.mark.long)])
 @pytest.mark.parametrize("draw", TOPOLOGIES)
 def test_nearest_and_distance_against_search(draw: Draw, count: int) -> None:
-    rng, found = np.random.default_rng(5), 0
+    rng = np.random.default_rng(5)
+    found = 0
     for _ in range(count):
         leg = draw(rng)
         p = around(leg, rng, 40)
-        ok, q = workspace.reachable(leg, p), workspace.nearest(leg, p)
+        ok = workspace.reachable(leg, p)
+        q = workspace.nearest(leg, p)
         signed = workspace.distance(leg, p)
         assert workspace.reachable(leg, q).all()
         kinematics.inverse(leg, q)  # takes them all
@@ -227,7 +230,8 @@ def test_coaxial_centre_goes_down() -> None:
 @pytest.mark.parametrize("tilt", np.linspace(-1.5, 1.5, 13))
 def test_tie_on_the_symmetry_axis_goes_to_the_side_where_the_leg_hangs(tilt: float) -> None:
     leg = FiveBar(L1=0.1, L2=0.012, L3=0.012, L4=0.1, L5=0.11, tilt=tilt)
-    along, down = unit(tilt), unit(tilt - 0.5 * math.pi)
+    along = unit(tilt)
+    down = unit(tilt - 0.5 * math.pi)
     part = math.sqrt(0.088**2 - 0.055**2) * down
     for x in np.linspace(-0.03, 0.03, 21):
         for above, expected in ((0.0, part), (1e-9, -part)):

@@ -29,7 +29,8 @@ def test_boundary_points_are_of_both_sides_and_wherever_nearest_goes(mode: Mode 
         pieces = workspace.boundary(leg, mode=mode)
         b = np.concatenate(pieces)
         for x in pieces:
-            step, middle = length(np.diff(x, axis=0)), 0.5 * (x[1:] + x[:-1])
+            step = length(np.diff(x, axis=0))
+            middle = 0.5 * (x[1:] + x[:-1])
             assert step.max() < 0.04 * leg.size
             bulge = np.abs(workspace.distance(leg, middle, mode=mode))
             assert (bulge < 0.006 * step + 1e-12 * leg.size).all()  # a turn of 0.04: its eighth

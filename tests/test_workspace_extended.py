@@ -32,7 +32,8 @@ EITHER: list[Mode | None] = [None, (-1, 1), (1, 1)]  # both elbows of side A, an
 
 def check_against_search(leg: FiveBar, p: Array, mode: Mode | None) -> Bools:
     """Compare all answers for p (n, 2); return where the search found the boundary."""
-    ok, q = workspace.reachable(leg, p, mode=mode), workspace.nearest(leg, p, mode=mode)
+    ok = workspace.reachable(leg, p, mode=mode)
+    q = workspace.nearest(leg, p, mode=mode)
     signed = workspace.distance(leg, p, mode=mode)
     assert workspace.reachable(leg, q, mode=mode).all()
     modes = MODES if mode is None else [mode]
@@ -56,9 +57,11 @@ def check_against_search(leg: FiveBar, p: Array, mode: Mode | None) -> Bools:
 
 @pytest.mark.parametrize("draw", TOPOLOGIES)
 def test_nearest_and_distance_against_search(draw: Draw) -> None:
-    rng, found = np.random.default_rng(5), 0
+    rng = np.random.default_rng(5)
+    found = 0
     for k in range(9):
-        leg, mode = draw(rng), EITHER[k % 3]
+        leg = draw(rng)
+        mode = EITHER[k % 3]
         if mode is not None and not workspace.boundary(leg, mode=mode):
             mode = None  # no foot position has this elbow
         found += int(check_against_search(leg, around(leg, rng, 25), mode).sum())
@@ -93,7 +96,8 @@ def test_far_point_goes_to_the_support_in_its_direction() -> None:
 
 @pytest.mark.parametrize("leg", [BENT, replace(BENT, L6=0.0), replace(BENT, L2=0.05, L6=0.0)])
 def test_margin_keeps_away_from_the_boundary(leg: FiveBar) -> None:
-    p, margin = around(leg, np.random.default_rng(4), 4000), 0.003
+    p = around(leg, np.random.default_rng(4), 4000)
+    margin = 0.003
     held = workspace.distance(leg, p) >= margin
     assert 0 < held.sum() < workspace.reachable(leg, p).sum()
     np.testing.assert_array_equal(workspace.reachable(leg, p, margin=margin), held)

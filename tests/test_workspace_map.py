@@ -44,7 +44,8 @@ def test_command_draws(
 
 
 def test_path_is_drawn(tmp_path: Path) -> None:
-    plain, with_path = tmp_path / "plain.svg", tmp_path / "path.svg"
+    plain = tmp_path / "plain.svg"
+    with_path = tmp_path / "path.svg"
     assert main(["workspace", "classic", "--out", str(plain)]) == 0
     assert main(["workspace", "classic", "--out", str(with_path), "--path", "classic-ellipse"]) == 0
     assert "#ffa500" in with_path.read_text()

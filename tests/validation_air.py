@@ -34,7 +34,9 @@ PRESETS = tuple(resources.shipped("models/legs"))
 INTEGRATORS: tuple[Integrator, ...] = ("discrete", "implicitfast")
 FEEDFORWARDS = ("none", "velocity", "torque")
 TIMESTEPS = (2e-3, 1e-3, 5e-4, 2.5e-4, 1.25e-4)
-RAMP, PERIOD = 0.25, 0.5  # [s]
+# [s]
+RAMP = 0.25
+PERIOD = 0.5
 TICK = TIMESTEPS[-1]  # [s]; all steps start and end at multiples of it
 GRID = round(TIMESTEPS[0] / TICK)  # ticks between two rows that are compared
 ROWS = slice(round(RAMP / TIMESTEPS[0]), None)
@@ -102,7 +104,8 @@ def rest(leg: FiveBar) -> tuple[float, float]:
 
 def around_rest(leg: FiveBar) -> Ellipse:
     """Return an ellipse from the rest pose on, a quarter of the leg's size long."""
-    (x, z), size = rest(leg), leg.size
+    x, z = rest(leg)
+    size = leg.size
     radii = (0.12 * size, 0.06 * size)
     return Ellipse(centre=(x, z + radii[1]), radii=radii, frequency=1.0 / PERIOD, ramp=RAMP)
 
@@ -170,7 +173,8 @@ def measure(keys: Sequence[Key], nthread: int = 2) -> dict[Key, Error]:
     for key in keys:
         leg = FiveBar.load(key.preset)
         plans.append(rollout.plan(scenario(leg, around_rest(leg), gains(key.preset), key)))
-    results, sensed = rollout.run_all(plans, nthread), sensors(plans, nthread)
+    results = rollout.run_all(plans, nthread)
+    sensed = sensors(plans, nthread)
     return {
         key: _compared(key, result, sensor)
         for key, result, sensor in zip(keys, results, sensed, strict=True)
@@ -194,8 +198,10 @@ def sensors(plans: Sequence[Plan], nthread: int = 2) -> list[Array]:
 
 
 def _compared(key: Key, result: Result, sensor: Array) -> Error:
-    known, record = truth(key.preset, key.feedforward), sampled(result, ROWS.start)
-    foot, tau = pair(record, "foot_x", "foot_z"), pair(record, "torque_A", "torque_E")
+    known = truth(key.preset, key.feedforward)
+    record = sampled(result, ROWS.start)
+    foot = pair(record, "foot_x", "foot_z")
+    tau = pair(record, "torque_A", "torque_E")
     every = round(TIMESTEPS[0] / key.timestep)
     sensor = sensor[every - 1 :: every][ROWS]
     scale = rms(known.tau)

@@ -16,7 +16,9 @@ from fivebar_sim.control.servo import Servo
 from fivebar_sim.integrator import Integrator
 from fivebar_sim.simulation import steps
 
-LEG, SLACK, START = motion_tests.LEG, motion_tests.SLACK, motion_tests.START
+LEG = motion_tests.LEG
+SLACK = motion_tests.SLACK
+START = motion_tests.START
 STIFFNESS = motion_tests.STIFFNESS
 SECONDS = 10.0
 
@@ -35,9 +37,12 @@ def inverse_dynamics(preset: str) -> tuple[float, float]:
     mj = model.build(leg)
     off = mujoco.mjtDisableBit
     mj.opt.disableflags |= off.mjDSBL_CONSTRAINT | off.mjDSBL_ACTUATION | off.mjDSBL_DAMPER
-    data, found = mujoco.MjData(mj), np.empty_like(tau)
+    data = mujoco.MjData(mj)
+    found = np.empty_like(tau)
     for i in range(len(foot)):
-        data.qpos, data.qvel, data.qacc = motion.q[i], motion.q_dot[i], motion.q_ddot[i]
+        data.qpos = motion.q[i]
+        data.qvel = motion.q_dot[i]
+        data.qacc = motion.q_ddot[i]
         mujoco.mj_inverse(mj, data)
         left, right, tip = (
             pose_tests.site_jacobian(mj, data, name) for name in ("C_left", "C_right", "foot")
@@ -66,7 +71,8 @@ class Swing(NamedTuple):
     @property
     def drift(self) -> float:
         """The change from the mean over the first second to that over the last."""
-        first, last = self.time <= 1.0, self.time > SECONDS - 1.0
+        first = self.time <= 1.0
+        last = self.time > SECONDS - 1.0
         return float(self.energy[last].mean() - self.energy[first].mean())
 
     @property
@@ -81,7 +87,8 @@ def swing(integrator: Integrator, timestep: float) -> Swing:
     mj = model.build(
         LEG, servo=Servo(kp=STIFFNESS, kd=0.0), timestep=timestep, integrator=integrator
     )
-    foot, rest = kinematics.forward(LEG, START)[None], np.zeros((1, 2))
+    foot = kinematics.forward(LEG, START)[None]
+    rest = np.zeros((1, 2))
     q = kinematics.joint_motion(LEG, foot, rest, rest).q
     ctrl = np.broadcast_to(SLACK, (1, round(SECONDS / timestep), 2))
     states = steps.simulate(mj, q, ctrl)

@@ -21,8 +21,11 @@ from fivebar_sim.scenario.scenes import Payload
 from fivebar_sim.simulation import steps
 
 FORCE = 80.0  # [N]
-GROWS, DURATION = 0.2, 0.3  # [s]
-STIFF, SOFT = Servo(kp=2000.0, kd=20.0), Servo(kp=50.0, kd=0.3)
+# [s]
+GROWS = 0.2
+DURATION = 0.3
+STIFF = Servo(kp=2000.0, kd=20.0)
+SOFT = Servo(kp=50.0, kd=0.3)
 """Of `classic`; other legs have them scaled with their size."""
 
 

@@ -96,7 +96,8 @@ def truth(preset: str, feedforward: str) -> Stance:
 def _truth(preset: str, feedforward: str, *, grips: bool, start: complex | None) -> Stance:
     leg = FiveBar.load(preset)
     ground = oracle_stance.Ground(TRUNK, leg.foot_radius, grips)
-    law, path = air.servo_of(gains(leg), feedforward), air.path_of(squat(leg))
+    law = air.servo_of(gains(leg), feedforward)
+    path = air.path_of(squat(leg))
     return oracle_stance.simulate(oracle.Leg.of(leg), ground, law, path, GRID, start=start)
 
 
@@ -124,7 +125,8 @@ class Grip(NamedTuple):
 
 def grip(key: Key, noslip: int) -> Grip:
     """Return how a stance with friction compares; noslip: iterations of MuJoCo's solver."""
-    leg, plan = FiveBar.load(key.preset), planned(key, grips=True)
+    leg = FiveBar.load(key.preset)
+    plan = planned(key, grips=True)
     plan.model.opt.noslip_iterations = noslip
     result = rollout.execute(plan)
     record = air.sampled(result, FIRST)
@@ -133,7 +135,8 @@ def grip(key: Key, noslip: int) -> Grip:
 
     # at the start the contact carries nothing yet and the foot slides: begin where it stood later
     x, z = air.rest(leg)
-    wanted, foot = float(rolled.mean()), complex(x, z)
+    wanted = float(rolled.mean())
+    foot = complex(x, z)
     for _ in range(3):  # F_x moves the ball by nearly as much: three rounds are enough
         psi = oracle.pose(oracle.Leg.of(leg), foot)
         foot += wanted - float(_rolled(leg, np.array(foot.real), np.array(psi[1])))
@@ -149,9 +152,12 @@ def _rolled(leg: FiveBar, foot_x: Array, psi_2: Array) -> Array:
 
 
 def _compared(result: Result, known: Stance) -> Error:
-    record, rows = air.sampled(result, FIRST), slice(FIRST, None)
-    tau, scale = air.pair(record, "torque_A", "torque_E"), air.rms(known.tau[rows])
-    N, height = known.ground[rows, 1], floor.height(result.scenario.leg, record)
+    record = air.sampled(result, FIRST)
+    rows = slice(FIRST, None)
+    tau = air.pair(record, "torque_A", "torque_E")
+    scale = air.rms(known.tau[rows])
+    N = known.ground[rows, 1]
+    height = floor.height(result.scenario.leg, record)
     return Error(
         rms=air.worst(air.rms(tau) / scale - 1.0),
         late=air.worst(air.rms(tau - known.tau[rows]) / scale),
@@ -177,7 +183,8 @@ def static(preset: str, integrator: Integrator, aside: float) -> tuple[Array, Ar
     hold = Line(start=at, stop=at, frequency=1.0)
     record = rollout.run(_held(leg, hold, Rail(mass=TRUNK, friction=0.0), integrator, 1.5)).record
     end = {name: column[-1] for name, column in record.items()}
-    theta, still = (end["theta_A"], end["theta_E"]), (0.0, 0.0)
+    theta = (end["theta_A"], end["theta_E"])
+    still = (0.0, 0.0)
     force = (end["ground_x"], end["ground_z"])
     need = dynamics.inverse(leg, theta, still, still, force)
     weight = -(TRUNK + sum(link.mass for link in leg.links)) * leg.gravity[1]

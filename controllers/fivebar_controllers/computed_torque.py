@@ -58,7 +58,8 @@ class ComputedTorque(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw
             SingularError: Where B, C and D are in line.
         """
         del servo  # the motors are bare
-        theta, rate = seen.theta, seen.theta_dot
+        theta = seen.theta
+        rate = seen.theta_dot
         pd = self.kd * (wanted.theta_dot - rate) + self.kp * (wanted.theta - theta)
         a = wanted.theta_ddot + pd
         moving = dynamics.inverse(leg, theta, rate, a, payload=wanted.payload)

@@ -55,7 +55,8 @@ class Impedance(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only
             SingularError: Where B, C and D are in line.
         """
         del servo  # the motors are bare
-        theta, rate = seen.theta, seen.theta_dot
+        theta = seen.theta
+        rate = seen.theta_dot
         J = kinematics.jacobian(leg, theta)
         p = kinematics.forward(leg, theta)
         p_dot = J[..., 0] * rate[..., :1] + J[..., 1] * rate[..., 1:]

@@ -52,14 +52,18 @@ class Servo(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
             SingularError, DivergedError: With "torque", where the loop of `implicitfast` cannot
                 follow the motion; see `dynamics.soft_loop`.
         """
-        q, h, payload = motion.q, motion.timestep, motion.payload
+        q = motion.q
+        h = motion.timestep
+        payload = motion.payload
         if self.feedforward == "torque" and integrator == "implicitfast":
             q = dynamics.soft_loop(leg, q, h, servo.damping, payload=payload)
+
         rows = slice(1, None) if integrator == "discrete" else slice(None, -1)
         u = q[rows][:, MOTORS]
         if self.feedforward != "none":
             rate = np.diff(q[:, MOTORS], axis=0) / h
             u = u + (servo.damping / servo.kp) * rate
+
         if self.feedforward == "torque":
             tau = dynamics.step_torques(
                 leg, q, h, motion.force[:-1], payload=payload, friction=servo.friction

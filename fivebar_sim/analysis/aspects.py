@@ -142,7 +142,8 @@ def same_aspect(
         UnreachableError, SingularError, ArgumentError: As `aspect_at`, for p or for q; and for
             shapes that do not broadcast.
     """
-    p, q = as_pairs(p, "p"), as_pairs(q, "q")
+    p = as_pairs(p, "p")
+    q = as_pairs(q, "q")
     try:
         np.broadcast_shapes(p.shape, q.shape)
     except ValueError:
@@ -175,12 +176,15 @@ def _aspect(leg: FiveBar, points: Points, cells: int) -> Aspect:
             f"{came}{at(index)}",
             index,
         )
-    atlas, q = _atlas(leg, cells), _directions(leg, points)
+
+    atlas = _atlas(leg, cells)
+    q = _directions(leg, points)
     near = _corners(q, _sheets(leg, points), cells)
     gap = np.abs(wrap(atlas.q[near] - q[..., None, :])).max(axis=-1)
     linked = (atlas.triple[near] == triple[..., None, :]).all(axis=-1)
     best = np.argmin(np.where(linked, gap, np.inf), axis=-1)[..., None]
     part = np.where(linked.any(axis=-1), np.take_along_axis(atlas.part[near], best, -1)[..., 0], 0)
+
     return Aspect(triple[..., 0], triple[..., 1], triple[..., 2], part)
 
 
@@ -203,27 +207,35 @@ def _drawn(leg: FiveBar, cells: int) -> _Atlas:
     triple[~closed | (triple == 0).any(axis=-1)] = 0
 
     corners = _corners(q, _sheets(leg, points), cells)
-    one, other = np.repeat(np.arange(len(q)), corners.shape[1]), corners.ravel()
+    one = np.repeat(np.arange(len(q)), corners.shape[1])
+    other = corners.ravel()
     joined = triple[one].any(axis=-1) & (triple[one] == triple[other]).all(axis=-1)
+
     return _Atlas(q, triple, _numbered(triple, _roots(len(q), one[joined], other[joined])))
 
 
 def _chart(leg: FiveBar, chart: int, s: int, cells: int) -> tuple[Array, Bools]:
     """Return the directions (n^2, 4) of one sheet's nodes, and where there is a pose, (n^2,)."""
     angle = 2.0 * np.pi / cells * (np.arange(cells, dtype=np.float64) + 0.5) - np.pi
-    first, second = np.repeat(angle, cells), np.tile(angle, cells)
+    first = np.repeat(angle, cells)
+    second = np.tile(angle, cells)
     A, E = bases(leg)
+
     if chart == 0:
-        B, D = A + leg.L1 * unit(first), E + leg.L4 * unit(second)
+        B = A + leg.L1 * unit(first)
+        D = E + leg.L4 * unit(second)
         psi_2, ok = side_angle(D - B, leg.L2, leg.L3, s)
         C = B + leg.L2 * unit(psi_2)
         return np.stack([first, psi_2, second, _direction(C - D)], axis=-1), ok
-    side_A, side_E = (A, leg.L1, leg.L2), (E, leg.L4, leg.L3)
+
+    side_A = (A, leg.L1, leg.L2)
+    side_E = (E, leg.L4, leg.L3)
     one, other = (side_A, side_E) if chart == 1 else (side_E, side_A)
     C = one[0] + one[1] * unit(first) + one[2] * unit(second)
     third, ok = side_angle(C - other[0], other[1], other[2], s)
     fourth = _direction(C - other[0] - other[1] * unit(third))
     order = (first, second, third, fourth) if chart == 1 else (third, fourth, first, second)
+
     return np.stack(order, axis=-1), ok
 
 
@@ -274,7 +286,8 @@ def _roots(count: int, one: Ints, other: Ints) -> Ints:
         while (longer := root[root] != root).any():
             root[longer] = root[root[longer]]
         differ = root[one] != root[other]
-        one, other = one[differ], other[differ]
+        one = one[differ]
+        other = other[differ]
     return root
 
 

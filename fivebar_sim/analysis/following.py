@@ -99,10 +99,12 @@ def follow(
             continuous motion follows the path; `.index` is the first such point.
         ArgumentError: A wrong shape, theta0 not finite, or unless step_max > 0.
     """
-    path, start = _path(foot), as_pairs(theta0, "theta0")
+    path = _path(foot)
+    start = as_pairs(theta0, "theta0")
     check_number("step_max", step_max, "rad", low=0.0, strict=True)
     if start.shape != (2,):
         raise ArgumentError(f"theta0 must have shape (2,), got {start.shape}")
+
     every = inverse_all(leg, path)
     lost = np.asarray(np.isnan(every[..., 0]).all(axis=-1))
     _refuse_lost(leg, path, lost, [leg.mode] * len(path))
@@ -114,6 +116,7 @@ def follow(
     _refuse_jump(theta, step_max)
     mode = np.array(MODES)[row]
     changed = np.flatnonzero((mode[1:] != mode[:-1]).any(axis=-1)) + 1
+
     return Followed(theta, mode, changed)
 
 
@@ -173,7 +176,8 @@ def _nearest_rows(first: Array, every: Array) -> list[int]:
 def _closest(distance: Array, zero: float, time: Array) -> Closest:
     """Return the nearest and the first meeting of a distance (N,); at most `zero` [m] is met."""
     i = int(np.argmin(np.abs(distance)))
-    d_1, d_2 = distance[:-1], distance[1:]
+    d_1 = distance[:-1]
+    d_2 = distance[1:]
     k = np.flatnonzero(np.sign(d_1) * np.sign(d_2) < 0.0)
     between = time[k] + np.diff(time)[k] * d_1[k] / (d_1[k] - d_2[k])
     met = np.concatenate([time[np.abs(distance) <= zero], between])

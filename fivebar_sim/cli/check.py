@@ -55,14 +55,18 @@ def check(
     places = [baseline.place(source) for source in sources]
     olds = [baseline.read(place) for place in places]
     _check_places(junit, summary)
+
     with working(f"checking {len(plans)} scenarios", quiet=quiet):
         results = _results(plans)
+
     checked = [_judge(*each) for each in zip(plans, results, olds, strict=True)]
     if update:
         checked = [_update(*each) for each in zip(checked, results, olds, places, strict=True)]
+
     status = max(_keep(each, result, keep) for each, result in zip(checked, results, strict=True))
     if not quiet:
         console.print_check(checked, screen())
+
     _publish(checked, junit, summary)
     return status
 
@@ -142,7 +146,8 @@ def _update(
 
     if isinstance(result, DivergedError) or result.verdict != "pass":
         return checked._replace(notes=[*checked.notes, "its baseline is not updated: it failed"])
-    accepted, new = comparison.accept(checked), baseline.record(result.metrics, old)
+    accepted = comparison.accept(checked)
+    new = baseline.record(result.metrics, old)
     if new == old:
         return accepted
     baseline.write(place, new)

@@ -28,6 +28,7 @@ def plans_of(scenarios: Iterable[str], settings: Sequence[str]) -> list[Plan]:
     loaded = [(source, Scenario.load(source, settings)) for source in chosen]
     plans = []
     memory.check(sum(scenario.steps for _, scenario in loaded))
+
     for source, scenario in loaded:
         try:
             plans.append(rollout.plan(scenario))

@@ -39,9 +39,11 @@ def print_result(result: Result, where: str, console: Console) -> None:
             continue
         judged = (bounds(limit), verdict(limit.ok)) if limit else ("", "")
         table.add_row(label, shown(key, look_up(result.metrics, key)), *judged)
+
     console.print(table)
     for said in guards.tripped(result.metrics["guards"]):
         console.print(f"[red]{said}[/red]", soft_wrap=True)
+
     console.print(
         f"verdict: {verdict(result.verdict == 'pass')}   written to {escape(where)}", soft_wrap=True
     )
@@ -69,6 +71,7 @@ def print_check(checked: Sequence[Checked], console: Console) -> None:
             table.add_row(" run", *[""] * 4, verdict(False))
         elif not each.rows:
             table.add_row(" no limits set", *[""] * 4, verdict(True))
+
     options = console.options.update(max_width=WIDEST)
     wide = None if console.is_terminal else Measurement.get(console, options, table).maximum
     console.print(table, width=wide, crop=False)

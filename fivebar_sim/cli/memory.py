@@ -30,7 +30,8 @@ def check(steps: int = 0) -> None:
     Raises:
         ConfigError: The limit is below that; says both.
     """
-    limit, needed = allowed(), LEAST + A_STEP * steps
+    limit = allowed()
+    needed = LEAST + A_STEP * steps
     if limit is not None and limit < needed:
         what = f"a run of {steps} steps" if steps else "fivebar"
         raise ConfigError(

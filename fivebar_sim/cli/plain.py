@@ -28,7 +28,8 @@ class Plain:
     """
 
     def __init__(self, stream: Any) -> None:
-        self.styled, self.stream = False, stream
+        self.styled = False
+        self.stream = stream
 
     def write(self, text: str) -> int:
         """Write a text, plain."""

@@ -63,8 +63,10 @@ def _call(args: list[str]) -> int:
     if args == ["--version"]:
         print(f"fivebar-sim {version('fivebar-sim')}")  # noqa: T201
         return 0
+
     if not HELP & set(args):
         memory.check()
+
     import tyro
 
     plain.style(allowed=all(arg.isprintable() for arg in args))  # the parser quotes them

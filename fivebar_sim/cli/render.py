@@ -48,7 +48,9 @@ def render(
     film = render.Film(width, height, fps, speed, at)
     with working(f"drawing {place}", quiet=False):
         frames = render.write(replay(run.scenario, run.record), place, film)
+
     size = place.stat().st_size / 1e3
     what = "1 frame" if frames == 1 else f"{frames} frames"
     print(f"drew {what} of {run.scenario.name} into {place}: {size:.0f} kB")  # noqa: T201
+
     return 0

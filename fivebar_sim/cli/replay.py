@@ -60,4 +60,5 @@ def _serve(run_dirs: tuple[Path, ...], port: int) -> int:
             server.serve_forever()
     except KeyboardInterrupt:
         signals.answered()
+
     return 0

@@ -82,7 +82,8 @@ def _run(
 
     from fivebar_sim.cli import console
 
-    status, metrics = 0, {}
+    status = 0
+    metrics = {}
     out = screen()
     for planned, place in zip(plans, places, strict=True):
         name = planned.scenario.name
@@ -98,6 +99,7 @@ def _run(
         status = max(status, 0 if result.verdict == "pass" else FAILED)
         if not (quiet or as_json):
             console.print_result(result, str(place), out)
+
     if as_json:
         shown = next(iter(metrics.values()), None) if len(plans) == 1 else metrics
         print(json.dumps(shown, indent=2, allow_nan=False))  # noqa: T201

@@ -32,6 +32,7 @@ def heard() -> Iterator[None]:
     if threading.current_thread() is not threading.main_thread():
         yield
         return
+
     _sent.clear()
     usual = {signal.SIGINT: signal.default_int_handler, signal.SIGTERM: signal.SIG_DFL}
     before = {n: usual[n] for n in usual if signal.getsignal(n) == usual[n]}
@@ -48,6 +49,7 @@ def heard() -> Iterator[None]:
 
     for number in before:
         signal.signal(number, end)
+
     unraisable = sys.unraisablehook
     sys.unraisablehook = _quiet
     try:

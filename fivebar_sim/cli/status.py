@@ -6,9 +6,13 @@ import sys
 
 from fivebar_sim.cli.plain import plain
 
-FAILED, WRONG, INTERRUPTED, UNREAD = 1, 2, 130, 141
+FAILED = 1
+WRONG = 2
+INTERRUPTED = 130
+UNREAD = 141
 
-HEAD, TAIL = 400, 190
+HEAD = 400
+TAIL = 190
 """Characters that are kept of the begin and the end of a line too long to be read."""
 
 

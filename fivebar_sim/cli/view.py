@@ -30,7 +30,9 @@ def view(
     if isinstance(what, FiveBar):
         view.hold(what)
         return 0
+
     with working(f"simulating {what.name}", quiet=False):
         result = rollout.run(what)
+
     view.play(replay(result.scenario, result.record))
     return 0

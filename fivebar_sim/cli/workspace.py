@@ -30,9 +30,11 @@ def workspace(
     followed = None if path is None else Scenario.load(path).foot_path
     place = Path(f"workspace-{drawn.name}.png" if out is None else out)
     surveyed = workspace_map.write(drawn, place, followed)
-    area, deepest = 1e4 * surveyed.area, 1e3 * float(surveyed.distance.max())
+    area = 1e4 * surveyed.area
+    deepest = 1e3 * float(surveyed.distance.max())
     print(  # noqa: T201
         f"{drawn.name}: the foot reaches {area:.1f} cm2 and gets up to {deepest:.1f} mm inside; "
         f"drawn in {place}"
     )
+
     return 0

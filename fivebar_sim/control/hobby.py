@@ -61,11 +61,14 @@ class HobbyServo:
             raise ArgumentError(f"direction must be -1 or 1, got {self.direction!r}")
         if not isinstance(self.range, tuple) or len(self.range) != 2:
             raise ArgumentError(f"range must be (low, high) [rad], got {self.range!r}")
+
         for end in self.range:
             check_number("range", end, "rad")
+
         low, high = self.range
         if not 0.0 < high - low <= TURN * (1.0 + TIE):
             raise ArgumentError(f"range must be in (0, {TURN:g}] rad wide, got {self.range!r}")
+
         check_number("resolution", self.resolution, "rad", low=0.0, high=high - low)
         if not self.resolution > 0.0 or abs((high - low) / self.resolution - self.steps) > 1e-6:
             raise ArgumentError(
@@ -145,7 +148,8 @@ def servo_angles(leg: FiveBar, theta: ArrayLike, table: ServoTable = HANGING) ->
         ArgumentError: A shape other than (..., 2), or angles that are not finite.
     """
     theta = _finite_pairs(theta, "theta")
-    commanded, beyond = np.empty(theta.shape), np.empty(theta.shape, dtype=bool)
+    commanded = np.empty(theta.shape)
+    beyond = np.empty(theta.shape, dtype=bool)
     for side, servo in enumerate((table.A, table.E)):
         low, high = servo.range
         middle = 0.5 * (low + high)
@@ -157,6 +161,7 @@ def servo_angles(leg: FiveBar, theta: ArrayLike, table: ServoTable = HANGING) ->
         commanded[..., side] = np.where(
             beyond[..., side], angle, low + whole * ((high - low) / servo.steps)
         )
+
     if beyond.any():
         raise _beyond_range(commanded, beyond, table)
     return commanded
@@ -242,14 +247,17 @@ def rounding_bound(leg: FiveBar, theta: ArrayLike, table: ServoTable = HANGING) 
         SingularError: Where B, C and D are in line.
     """
     theta = _finite_pairs(theta, "theta")
-    h_A, h_E = table.A.half_step, table.E.half_step
+    h_A = table.A.half_step
+    h_E = table.E.half_step
     J = jacobian(leg, theta)
     first = np.hypot(J[..., 0, 0], J[..., 1, 0]) * h_A + np.hypot(J[..., 0, 1], J[..., 1, 1]) * h_E
 
-    k, lam = leg.L1 * h_A + leg.L4 * h_E, leg.L6 / leg.L2
+    k = leg.L1 * h_A + leg.L4 * h_E
+    lam = leg.L6 / leg.L2
     B, D = knees(leg, theta)
     d = np.sqrt(dot(D - B, D - B))
     s = np.minimum(_sine_at_C(leg, d - k), _sine_at_C(leg, d + k))
+
     with np.errstate(divide="ignore"):  # s = 0: the bound is inf
         turning = (1.0 / leg.L2 + 1.0 / leg.L3) * (k / s) ** 2
         C_ddot = (leg.L1 * h_A**2 + leg.L4 * h_E**2 + turning) / s
@@ -258,7 +266,8 @@ def rounding_bound(leg: FiveBar, theta: ArrayLike, table: ServoTable = HANGING) 
 
 def _sine_at_C(leg: FiveBar, d: Array) -> Array:
     """Return the sine of the angle at C for |BD| = d [m], and 0 where no such triangle is."""
-    high, low = leg.L2 + leg.L3, leg.L2 - leg.L3
+    high = leg.L2 + leg.L3
+    low = leg.L2 - leg.L3
     square = (high**2 - d**2) * (d**2 - low**2)
     return np.where(d > 0.0, np.sqrt(np.maximum(square, 0.0)), 0.0) / (2.0 * leg.L2 * leg.L3)
 
@@ -277,8 +286,10 @@ def _beyond_range(commanded: Array, beyond: Bools, table: ServoTable) -> Unreach
     bad = np.logical_not((~beyond).all(axis=-1))
     index = first_index(bad)
     side = int(np.argmax(beyond[index]))
-    (low, high), came = (table.A, table.E)[side].range, float(commanded[index][side])
+    low, high = (table.A, table.E)[side].range
+    came = float(commanded[index][side])
     count = f"{int(bad.sum())} of {bad.size} poses are" if bad.ndim else "the pose is"
+
     return UnreachableError(
         f"{count} beyond a servo's range: the commanded angle at {'AE'[side]} must be in "
         f"[{np.degrees(low):g}, {np.degrees(high):g}] deg ([{low:g}, {high:g}] rad), got "

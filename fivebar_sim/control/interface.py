@@ -115,6 +115,7 @@ def find(name: str) -> type[Any]:
     controllers = known()
     if name not in controllers:
         raise ConfigError(unknown("controller", name, controllers))
+
     value = controllers[name].value
     try:
         kind = controllers[name].load()
@@ -122,10 +123,12 @@ def find(name: str) -> type[Any]:
         raise ConfigError(
             f"cannot load controller {name!r} from {value}: {type(error).__name__}: {error}"
         ) from error
+
     struct = isinstance(kind, type) and issubclass(kind, msgspec.Struct)
     if not struct or not any(callable(getattr(kind, m, None)) for m in ("setpoints", "command")):
         raise ConfigError(
             f"controller {name!r}: {value} must be a msgspec Struct with a method setpoints or "
             f"command, got {kind!r}"
         )
+
     return kind

@@ -58,14 +58,17 @@ class Servo(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
         check_number("kd", self.kd, "N m s/rad", low=0.0)
         if self.limit is not None:
             check_number("limit", self.limit, "N m", low=0.0, strict=True)
+
         if self.speed is not None:
             check_number("speed", self.speed, "rad/s", low=0.0, strict=True)
             if self.limit is None:
                 raise ArgumentError("speed needs limit beside it: the stalled motor's torque [N m]")
             check_number("limit / speed", self.back_emf, "N m s/rad")
+
         check_number("friction", self.friction, "N m", low=0.0)
         if self.rate is not None:
             check_number("rate", self.rate, "Hz", low=0.0, strict=True)
+
         check_number("delay", self.delay, "s", low=0.0)
         check_step("resolution", self.resolution)
 
@@ -118,6 +121,7 @@ class Servo(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
                 )
             part = self.rate * timestep  # of a command in one step
             hold = max(1, round(1.0 / part) if part * steps > 1.0 else steps)
+
         late = round(min(self.delay / timestep, steps))
         since = np.arange(steps) - late
         return np.where(since < 0, -1, since // hold * hold)

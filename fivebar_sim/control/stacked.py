@@ -22,11 +22,13 @@ class _Stacked:
     """
 
     def __init__(self, items: Sequence[Any], axes: int) -> None:
-        self._items, self._axes = items, axes
+        self._items = items
+        self._axes = axes
 
     def __getattr__(self, name: str) -> Any:
         if name.startswith("__"):
             raise AttributeError(name)
+
         method = getattr(type(self._items[0]), name, None)
         if isinstance(method, FunctionType):
             value: Any = MethodType(method, self)
@@ -35,6 +37,7 @@ class _Stacked:
             value = values[0]
             if any(other != value for other in values):
                 value = np.array(values).reshape(len(values), *[1] * self._axes)
+
         self.__dict__[name] = value
         return value
 

@@ -73,12 +73,10 @@ class ControlStep:
         nsim = len(start)
         servos = [servo] * nsim if isinstance(servo, Servo) else list(servo)
         self.every = every
-        self._servo, self._sensors, self._drive, self._h = (
-            stacked(servos, 2),
-            sensors,
-            drive,
-            timestep,
-        )
+        self._servo = stacked(servos, 2)
+        self._sensors = sensors
+        self._drive = drive
+        self._h = timestep
         late = round(min(sensors.delay / timestep, steps))  # later, only the start would be seen
         self._theta = np.empty((nsim, late + 1, 2))
         self._theta_dot = np.zeros_like(self._theta)
@@ -120,8 +118,10 @@ class ControlStep:
 
     def observe(self, k: Steps) -> Observation:
         """Return what is seen at step k; the time is (nsim,) if k is."""
-        sensors, time = self._sensors, cast(float, k * self._h)
-        theta, theta_dot = self._theta[:, 0], self._theta_dot[:, 0]
+        sensors = self._sensors
+        time = cast(float, k * self._h)
+        theta = self._theta[:, 0]
+        theta_dot = self._theta_dot[:, 0]
         if self._noisy:
             drawn = self._draw()
             theta = theta + sensors.noise * drawn[:, 0]

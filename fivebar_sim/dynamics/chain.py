@@ -128,11 +128,13 @@ class Chain:
         sign = leg.assembly if assembly is None else assembly
         if sign not in (-1, 1):
             raise ArgumentError(f"assembly must be -1 or 1, got {assembly!r}")
+
         check_number("payload", payload, "kg", low=0.0, high=HEAVIEST)
         one, two, three, four = leg.links
         two = combined(two, Link(payload, leg.foot_offset, 0.0))
         x, z = kinematics.bases(leg)[1].tolist()  # E = -A
         right = three.mass + four.mass - one.mass - two.mass
+
         return cls(
             leg=leg,
             assembly=sign,
@@ -159,13 +161,17 @@ class Chain:
             SingularError: Where B, C and D are in line.
         """
         leg = self.leg
-        L1, L2, L3, L4 = leg.L1, leg.L2, leg.L3, leg.L4
+        L1 = leg.L1
+        L2 = leg.L2
+        L3 = leg.L3
+        L4 = leg.L4
         e1 = np.cos(theta_A), np.sin(theta_A)
         e4 = np.cos(theta_E), np.sin(theta_E)
         x = self.AE[0] + L4 * e4[0] - L1 * e1[0]  # BD
         z = self.AE[1] + L4 * e4[1] - L1 * e1[1]
         d2 = x * x + z * z
         area = ((L2 + L3) ** 2 - d2) * (d2 - (L2 - L3) ** 2)  # (4 times that of BCD) squared
+
         if not (area > (2.0 * L2 * L3 * SINGULAR) ** 2).all():
             kinematics.jacobian(leg, np.stack([theta_A, theta_E], axis=-1), self.assembly)
 
@@ -173,6 +179,7 @@ class Chain:
         across = self.assembly * np.sqrt(area) / (2.0 * d2)
         BC = along * x - across * z, along * z + across * x
         e2 = BC[0] / L2, BC[1] / L2
+
         return self.coupled(e1, e2, ((BC[0] - x) / L3, (BC[1] - z) / L3), e4)
 
     def coupled(self, e1: Vector, e2: Vector, e3: Vector, e4: Vector) -> Pose:
@@ -180,10 +187,15 @@ class Chain:
 
         G is the null space of the gap's Jacobian, so it is right also where the loop is open.
         """
-        L1, L2, L3, L4 = self.leg.L1, self.leg.L2, self.leg.L3, self.leg.L4
+        L1 = self.leg.L1
+        L2 = self.leg.L2
+        L3 = self.leg.L3
+        L4 = self.leg.L4
         s = cross(e2, e3)
-        a2, b2 = -L1 * cross(e1, e3) / (L2 * s), L4 * cross(e4, e3) / (L2 * s)
-        a3, b3 = -L1 * cross(e1, e2) / (L3 * s), L4 * cross(e4, e2) / (L3 * s)
+        a2 = -L1 * cross(e1, e3) / (L2 * s)
+        b2 = L4 * cross(e4, e3) / (L2 * s)
+        a3 = -L1 * cross(e1, e2) / (L3 * s)
+        b3 = L4 * cross(e4, e2) / (L3 * s)
         return Pose(e1, e2, e3, e4, a2, b2, a3, b3)
 
     def couplings(self, p: Pose) -> Vector:
@@ -194,7 +206,8 @@ class Chain:
     def mass(self, p: Pose) -> tuple[Scalar, Scalar, Scalar]:
         """Return M_AA, M_AE, M_EE [kg m^2] of M = G^T H G."""
         H12, H43 = self.couplings(p)
-        I2, I3 = self.I2, self.I3
+        I2 = self.I2
+        I3 = self.I3
         return (
             self.I1 + 2.0 * H12 * p.a2 + I2 * p.a2 * p.a2 + I3 * p.a3 * p.a3,
             H12 * p.b2 + I2 * p.a2 * p.b2 + I3 * p.a3 * p.b3 + H43 * p.a3,
@@ -208,10 +221,13 @@ class Chain:
         c1 = -X12 w2^2,  c2 = X12 w1^2,   X12 = L1 e1 x r2    (4, 3 likewise)
         Q_k = r_k x gravity
         """
-        (w1, w2, w3, w4), gravity = w, self.leg.gravity
+        w1, w2, w3, w4 = w
+        gravity = self.leg.gravity
         H12, H43 = self.couplings(p)
         r1, r2, r3, r4 = self.moments(p)
-        X12, X43 = self.leg.L1 * cross(p.e1, r2), self.leg.L4 * cross(p.e4, r3)
+        X12 = self.leg.L1 * cross(p.e1, r2)
+        X43 = self.leg.L4 * cross(p.e4, r3)
+
         return (
             self.I1 * alpha[0] + H12 * alpha[1] - X12 * w2 * w2 - cross(r1, gravity),
             H12 * alpha[0] + self.I2 * alpha[1] + X12 * w1 * w1 - cross(r2, gravity),
@@ -230,19 +246,26 @@ class Chain:
         k = L1 w1^2 e1 + L2 w2^2 e2 - L4 w4^2 e4 - L3 w3^2 e3
         """
         leg = self.leg
-        w2, w3 = p.a2 * w1 + p.b2 * w4, p.a3 * w1 + p.b3 * w4
-        k1, k2, k3, k4 = leg.L1 * w1 * w1, leg.L2 * w2 * w2, leg.L3 * w3 * w3, leg.L4 * w4 * w4
+        w2 = p.a2 * w1 + p.b2 * w4
+        w3 = p.a3 * w1 + p.b3 * w4
+        k1 = leg.L1 * w1 * w1
+        k2 = leg.L2 * w2 * w2
+        k3 = leg.L3 * w3 * w3
+        k4 = leg.L4 * w4 * w4
         k = (
             k1 * p.e1[0] + k2 * p.e2[0] - k4 * p.e4[0] - k3 * p.e3[0],
             k1 * p.e1[1] + k2 * p.e2[1] - k4 * p.e4[1] - k3 * p.e3[1],
         )
         s = cross(p.e2, p.e3)
-        g2, g3 = dot(k, p.e3) / (leg.L2 * s), dot(k, p.e2) / (leg.L3 * s)
+        g2 = dot(k, p.e3) / (leg.L2 * s)
+        g3 = dot(k, p.e2) / (leg.L3 * s)
+
         return self.at_motors(p, self.link_torques(p, (w1, w2, w3, w4), (0.0, g2, g3, 0.0)))
 
     def moments(self, p: Pose) -> tuple[Vector, Vector, Vector, Vector]:
         """Return r1..r4, the moments S1..S4 in the hip frame [kg m]."""
-        r1, r2 = placed(p.e1, self.S1), placed(p.e2, self.S2)
+        r1 = placed(p.e1, self.S1)
+        r2 = placed(p.e2, self.S2)
         return r1, r2, placed(p.e3, self.S3), placed(p.e4, self.S4)
 
     def foot_torques(self, p: Pose, force: Vector) -> Vector:
@@ -258,7 +281,8 @@ class Chain:
         M_AA, M_AE, M_EE = self.mass(p)
         h_A, h_E = self.bias(p, *w)
         f_A, f_E = (0.0, 0.0) if force is None else self.foot_torques(p, force)
-        t_A, t_E = tau[0] - h_A + f_A, tau[1] - h_E + f_E
+        t_A = tau[0] - h_A + f_A
+        t_E = tau[1] - h_E + f_E
         det = M_AA * M_EE - M_AE * M_AE
         return (M_EE * t_A - M_AE * t_E) / det, (M_AA * t_E - M_AE * t_A) / det
 

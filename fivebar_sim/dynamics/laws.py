@@ -76,6 +76,7 @@ def inverse(
     f_A, f_E = chain.foot_torques(p, _split(F))
     tau_A = M_AA * alpha[..., 0] + M_AE * alpha[..., 1] + h_A - f_A
     tau_E = M_AE * alpha[..., 0] + M_EE * alpha[..., 1] + h_E - f_E
+
     return np.stack([tau_A, tau_E], axis=-1) + friction * np.sign(w)
 
 
@@ -232,7 +233,8 @@ def energy(
     """
     chain = Chain.of(leg, assembly, payload)
     theta, w = _pairs(theta=theta, theta_dot=theta_dot)
-    p, (w1, w4) = chain.pose(*_split(theta)), _split(w)
+    p = chain.pose(*_split(theta))
+    w1, w4 = _split(w)
     rates = w1, p.a2 * w1 + p.b2 * w4, p.a3 * w1 + p.b3 * w4, w4
     kinetic, potential = chain.energies(p, rates)
     return Energy(np.asarray(kinetic), np.asarray(potential))

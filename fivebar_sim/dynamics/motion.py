@@ -133,14 +133,17 @@ def integrate(
     q, w = _start(theta, theta_dot)
     if q.shape != (2,):
         raise ArgumentError(f"theta must be of one leg, (2,), got {q.shape}; see simulate")
+
     t = finite(np.asarray(times, dtype=np.float64), "times")
     if t.ndim != 1 or t.size < 2 or not np.all(np.diff(t) > 0.0):
         raise ArgumentError("times must rise, at least two of them, shape (N,)")
+
     check_number("rtol", rtol, "", low=100 * np.finfo(float).eps, high=1.0)
     check_number("atol", atol, "rad", low=0.0, high=1.0)
     plant = _Plant(Chain.of(leg, assembly, payload), torque, foot_force)
     plant.chain.pose(q[0], q[1])
     states = _dop853(plant, np.concatenate([q, w]), t, rtol, atol)
+
     return Motion(t.copy(), states[:, :2].copy(), states[:, 2:].copy())
 
 
@@ -198,7 +201,8 @@ def _fitted(value: Array, name: str, shape: tuple[int, ...]) -> Array:
 def _runge_kutta(plant: _Plant, q: Array, w: Array, h: float, rows: range, steps: int) -> Motion:
     """Return the motion after each number of steps in rows."""
     motion = Motion(h * np.array(rows), *np.empty((2, len(rows), *q.shape)))
-    motion.theta[0], motion.theta_dot[0] = q, w
+    motion.theta[0] = q
+    motion.theta_dot[0] = w
     for k in range(steps):
         try:
             with np.errstate(over="ignore", invalid="ignore"):  # the check sees what they leave
@@ -209,7 +213,9 @@ def _runge_kutta(plant: _Plant, q: Array, w: Array, h: float, rows: range, steps
         q = after
         if k + 1 in rows:
             row = (k + 1) // rows.step
-            motion.theta[row], motion.theta_dot[row] = q, w
+            motion.theta[row] = q
+            motion.theta_dot[row] = w
+
     return motion
 
 
@@ -231,7 +237,8 @@ def _step(plant: _Plant, t: float, q: Array, w: Array, h: float) -> tuple[Array,
     of y = (q, w), f = (w, alpha).
     """
     half = 0.5 * h
-    w1, alpha1 = w, _stacked(plant, t, q, w)
+    w1 = w
+    alpha1 = _stacked(plant, t, q, w)
     w2 = w + half * alpha1
     alpha2 = _stacked(plant, t + half, q + half * w1, w2)
     w3 = w + half * alpha2
@@ -251,8 +258,11 @@ def _dop853(plant: _Plant, y: Array, times: Array, rtol: float, atol: float) -> 
     """Return the states of one leg at the given times, (N, 4)."""
     from scipy.integrate import DOP853  # the only use of scipy in dynamics, and slow to import
 
-    states, row, reached = np.empty((len(times), 4)), 1, float(times[0])
+    states = np.empty((len(times), 4))
+    row = 1
+    reached = float(times[0])
     states[0] = y
+
     try:
         solver = DOP853(plant.slope, times[0], y, times[-1], rtol=rtol, atol=atol)
         while row < len(times):

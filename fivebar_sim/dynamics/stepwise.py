@@ -65,6 +65,7 @@ def step_torques(
     p = _pose(chain, steps.psi)
     t_A, t_E = chain.at_motors(p, chain.link_torques(p, steps.w, steps.alpha))
     f_A, f_E = chain.foot_torques(p, (force[..., 0], force[..., 1]))
+
     return np.stack(
         [
             t_A - f_A + friction * np.sign(steps.w_next[0]),
@@ -184,13 +185,17 @@ def _pulled(chain: Chain, steps: _Steps, h: float, damping: float) -> Array:
     """Return P_left + k (A - E) of every step [m/s^2], (N, 2)."""
     k, b = pull(h)
     p = _pose(chain, steps.psi)
-    (w1, w2, _, _), (a1, a2, _, _) = steps.w, steps.alpha
+    w1, w2, _, _ = steps.w
+    a1, a2, _, _ = steps.alpha
     H12, _ = chain.couplings(p)
     share = h * damping / (chain.I1 * chain.I2 - H12 * H12)
     x1 = a1 + share * chain.I2 * a1 + b * w1
     x2 = a2 - share * H12 * a1 + b * w2
-    f1, f2 = chain.leg.L1 * (k - w1 * w1), chain.leg.L2 * (k - w2 * w2)
-    x1, x2 = chain.leg.L1 * x1, chain.leg.L2 * x2
+    f1 = chain.leg.L1 * (k - w1 * w1)
+    f2 = chain.leg.L2 * (k - w2 * w2)
+    x1 = chain.leg.L1 * x1
+    x2 = chain.leg.L2 * x2
+
     return np.stack(
         [
             f1 * p.e1[0] - x1 * p.e1[1] + f2 * p.e2[0] - x2 * p.e2[1] - k * chain.AE[0],
@@ -203,13 +208,22 @@ def _pulled(chain: Chain, steps: _Steps, h: float, damping: float) -> Array:
 def _trailing(chain: Chain, pulled: Array, start: Vector, h: float, damping: float) -> Array:
     """Return (psi_3, psi_4) that trail behind what pulls them [rad], (N + 1, 2)."""
     k, b = pull(h)
-    L3, L4 = chain.leg.L3, chain.leg.L4
-    (psi3, psi4), w3, w4 = start, 0.0, 0.0
+    L3 = chain.leg.L3
+    L4 = chain.leg.L4
+    psi3, psi4 = start
+    w3 = 0.0
+    w4 = 0.0
     rows = [start]
+
     for n, (x, z) in enumerate(pulled.tolist()):
-        c3, s3, c4, s4 = math.cos(psi3), math.sin(psi3), math.cos(psi4), math.sin(psi4)
-        f3, f4 = L3 * (k - w3 * w3), L4 * (k - w4 * w4)
-        x, z = x - f3 * c3 - f4 * c4, z - f3 * s3 - f4 * s4
+        c3 = math.cos(psi3)
+        s3 = math.sin(psi3)
+        c4 = math.cos(psi4)
+        s4 = math.sin(psi4)
+        f3 = L3 * (k - w3 * w3)
+        f4 = L4 * (k - w4 * w4)
+        x = x - f3 * c3 - f4 * c4
+        z = z - f3 * s3 - f4 * s4
         sine = c4 * s3 - s4 * c3
         if not abs(sine) > SINGULAR:
             raise _in_line("E, D and C", abs(sine), (n,))
@@ -219,13 +233,15 @@ def _trailing(chain: Chain, pulled: Array, start: Vector, h: float, damping: flo
         share = h * damping / (chain.I3 * chain.I4 - H43 * H43)
         alpha4 /= 1.0 + share * chain.I3
         alpha3 += share * H43 * alpha4
-        w3, w4 = w3 + h * alpha3, w4 + h * alpha4
+        w3 = w3 + h * alpha3
+        w4 = w4 + h * alpha4
         if not (abs(h * w3) < TURN_MAX and abs(h * w4) < TURN_MAX):
             raise DivergedError(
                 f"the soft loop cannot follow at t = {n * h:g} s: a link must turn by less than "
                 f"{TURN_MAX:g} rad in a step; try a smaller timestep",
                 n * h,
             )
-        psi3, psi4 = psi3 + h * w3, psi4 + h * w4
+        psi3 = psi3 + h * w3
+        psi4 = psi4 + h * w4
         rows.append((psi3, psi4))
     return np.array(rows)

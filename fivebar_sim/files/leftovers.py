@@ -22,6 +22,7 @@ def held(stage: Path) -> Iterator[None]:
     except ImportError:  # Windows has none, and nothing is swept there
         yield
         return
+
     handle = os.open(stage, os.O_RDONLY)
     try:
         with suppress(OSError):  # a file system without locks
@@ -46,12 +47,14 @@ def _left_over(found: Path) -> bool:
         import fcntl
     except ImportError:
         return False
+
     try:
         if found.is_symlink() or time.time() - found.stat().st_mtime < OLD:
             return False
         handle = os.open(found, os.O_RDONLY | os.O_DIRECTORY)
     except OSError:
         return False
+
     try:
         fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except OSError:

@@ -163,6 +163,7 @@ def bounds(
     """
     if not isinstance(table, dict):
         raise ConfigError(f"{where}: {name} must be a table, got {table!r}")
+
     limits: dict[str, tuple[float, float]] = {}
     check_keys(dict(flat(table)), known, f"{where}: [{name}]")
     for key, bound in flat(table):
@@ -175,6 +176,7 @@ def bounds(
                 f"{where}: {name}.{key} must be an upper bound or [low, high], got {bound!r}"
             )
         limits[key] = (float(pair[0]), float(pair[1]))
+
     return limits
 
 
@@ -225,13 +227,16 @@ def _explain(message: str, table: Table, kind: type, name: str) -> str:
         return f"{name}.{missing[1]} is missing"
     if not at:  # a Struct's own check, which begins with the key
         return f"{name}.{text}"
+
     key = re.split(r"[.\[]", at)[0]
     value = table.get(key)
     legal = get_args(get_type_hints(kind).get(key))
     if text.startswith("Invalid enum value") and legal:
         return f"{name}.{key} must be one of {', '.join(map(repr, legal))}, got {value!r}"
+
     expected = re.fullmatch(r"Expected `(\w+)[^`]*`(.*?)(, got .*)?", text)
     if expected:
         word = WORDS.get(expected[1], expected[1])
         return f"{name}.{at} must be {word}{expected[2]}, got {value!r}"
+
     return f"{name}.{at}: {text}"

@@ -74,8 +74,10 @@ def loop_joint(leg: FiveBar, B: Array, D: Array, assembly: int | None = None) ->
     sign = leg.assembly if assembly is None else assembly
     if sign not in (-1, 1):
         raise ArgumentError(f"assembly must be -1 or 1, got {assembly!r}")
+
     BD = D - B
-    low, high = abs(leg.L2 - leg.L3), leg.L2 + leg.L3
+    low = abs(leg.L2 - leg.L3)
+    high = leg.L2 + leg.L3
     d2 = dot(BD, BD)
     rounding = ROUNDING * (leg.size + leg.L5)  # of the coordinates of B and D [m]
     slack = rounding * high
@@ -163,9 +165,12 @@ def chain_points(leg: FiveBar, q: Array) -> Points:
         q: (theta_A, theta_B, theta_E, theta_D) [rad], knees relative to L1 and L4, (..., 4).
     """
     A, E = bases(leg)
-    psi2, psi3 = q[..., 0] + q[..., 1], q[..., 2] + q[..., 3]
-    B, D = A + leg.L1 * unit(q[..., 0]), E + leg.L4 * unit(q[..., 2])
-    C_left, C_right = B + leg.L2 * unit(psi2), D + leg.L3 * unit(psi3)
+    psi2 = q[..., 0] + q[..., 1]
+    psi3 = q[..., 2] + q[..., 3]
+    B = A + leg.L1 * unit(q[..., 0])
+    D = E + leg.L4 * unit(q[..., 2])
+    C_left = B + leg.L2 * unit(psi2)
+    C_right = D + leg.L3 * unit(psi3)
     F = C_left + leg.L6 * unit(psi2 + leg.bend)
     return Points(B, C_left, C_right, D, F)
 

@@ -83,7 +83,8 @@ def half_angle(r: Array, near: float, far: float, s: int) -> tuple[Array, Bools]
         alpha [rad] in [-pi, pi], from the frame's x axis, (...); and where the chain reaches.
     """
     d2 = dot(r, r)
-    a, b = 2.0 * near * r[..., 0], 2.0 * near * r[..., 1]
+    a = 2.0 * near * r[..., 0]
+    b = 2.0 * near * r[..., 1]
     c = d2 + (near - far) * (near + far)
     root = s * np.sqrt(np.maximum(a * a + b * b - c * c, 0.0))
     first = a * c + b * root >= 0.0
@@ -113,6 +114,7 @@ def _solve(leg: FiveBar, foot: Array, mode: Mode) -> tuple[Array, Bools]:
         beta, ok_E = half_angle(EC, leg.L4, leg.L3, mode[1])
         on_motor = np.stack([dot(AF, AF), dot(EC, EC)], axis=-1) == 0.0
         theta = principal(np.stack([alpha, beta], axis=-1) + leg.tilt)
+
     return np.where(on_motor, 0.0, theta), np.stack([ok_A, ok_E], axis=-1)
 
 
@@ -134,7 +136,8 @@ def inverse_half_angle(leg: FiveBar, foot: ArrayLike, mode: Mode | None = None) 
             the first such point.
         ArgumentError: Unknown mode, or a shape other than (..., 2).
     """
-    mode, foot = working_mode(leg, mode), as_pairs(foot, "foot")
+    mode = working_mode(leg, mode)
+    foot = as_pairs(foot, "foot")
     theta, ok = _solve(leg, foot, mode)
     if not ok.all():
         raise out_of_reach(leg, foot, theta, ok)
@@ -161,12 +164,14 @@ def inverse_within(leg: FiveBar, foot: ArrayLike, limits: ArrayLike) -> Array:
             message names the limit, `.index` is the first such point.
         ArgumentError: Limits that are not two finite ranges, or a foot of other shape.
     """
-    foot, (low, high) = as_pairs(foot, "foot"), _ends(limits)
+    foot = as_pairs(foot, "foot")
+    low, high = _ends(limits)
     solved = [solve(leg, foot, mode) for mode in MODES]
     theta = np.stack([angles for angles, _ in solved], axis=-2)
     ok = np.stack([reached for _, reached in solved], axis=-2)
     reached = ok[..., 0] & ok[..., 1]
     somewhere = reached.any(axis=-1, keepdims=True)
+
     if not somewhere.all():
         own = MODES.index(leg.mode)
         raise out_of_reach(leg, foot, theta[..., own, :], ok[..., own, :] | somewhere)
@@ -177,6 +182,7 @@ def inverse_within(leg: FiveBar, foot: ArrayLike, limits: ArrayLike) -> Array:
     within = fits[..., 0] & fits[..., 1]
     if not within.any(axis=-1).all():
         raise _beyond(foot, theta, fits, reached, (low, high))
+
     theta = theta + 2.0 * np.pi * np.clip(0.0, fewest, most)
     first = np.argmax(within, axis=-1)
     return np.take_along_axis(theta, first[..., None, None], axis=-2)[..., 0, :]
@@ -205,17 +211,21 @@ def _beyond(
     index = first_index(bad)
     kept = fits[index].any(axis=0)
     each = []
+
     for side in (0, 1):
         if not kept[side] or kept.all():
-            low, high = ends[0][side], ends[1][side]
+            low = ends[0][side]
+            high = ends[1][side]
             came = sorted({f"{angle:g}" for angle in theta[index][reached[index], side]}, key=float)
             each.append(
                 f"theta_{'AE'[side]} must be in [{low:g}, {high:g}] rad "
                 f"([{np.degrees(low):g}, {np.degrees(high):g}] deg), got {' or '.join(came)} rad"
             )
+
     count = f"{int(bad.sum())} of {bad.size} points are" if bad.ndim else "the point is"
     together = " in one mode" if kept.all() else ""
     x, z = foot[index]
+
     return UnreachableError(
         f"{count} beyond the joint limits in every working mode: {' and '.join(each)}{together}, "
         f"for the foot at ({x:g}, {z:g}) m{at(index)}",

@@ -217,14 +217,18 @@ def _turned_back(hip: Hip, foot: Array, side: ArrayLike | None) -> tuple[Array, 
         u = side sqrt((r - |w|) (r + |w|)),   phi = atan2(q u - p w, p u + q w)
     """
     sign = _sides(hip.side if side is None else side, foot.shape[:-1])
-    F, w = _axis_up(hip, foot), float(_axis_up(hip, np.array(hip.origin))[1])
-    p, q = F[..., 0], F[..., 1]
+    F = _axis_up(hip, foot)
+    w = float(_axis_up(hip, np.array(hip.origin))[1])
+    p = F[..., 0]
+    q = F[..., 1]
+
     with np.errstate(over="ignore", invalid="ignore"):  # 1e200 m is as far as inf
         r = np.hypot(p, q)
         u2 = (r - abs(w)) * (r + abs(w))
         ok = np.asarray((u2 >= -ROUNDING * w * w) & np.isfinite(foot).all(axis=-1))
         u = sign * np.sqrt(np.where(ok, np.maximum(u2, 0.0), np.nan))
         phi = direction(q * u - p * w, p * u + q * w)
+
     back = _axis_up(hip, np.stack([u, np.full(u.shape, w), F[..., 2]], axis=-1)) - hip.origin
     return phi, back[..., ::2], ok
 
@@ -239,7 +243,8 @@ def _axis_up(hip: Hip, v: Array) -> Array:
 def _turned(hip: Hip, v: Array, phi: Array) -> Array:
     """Return body vectors (..., 3) turned by phi (...) about the hip's axis."""
     p, q, r = np.moveaxis(_axis_up(hip, v), -1, 0)
-    c, s = np.cos(phi), np.sin(phi)
+    c = np.cos(phi)
+    s = np.sin(phi)
     return _axis_up(hip, np.stack([p * c - q * s, p * s + q * c, r], axis=-1))
 
 

@@ -49,15 +49,21 @@ def _best(leg: FiveBar, foot: Array) -> Array | None:
     found = np.isfinite(theta[:, 0])
     p = points_at(leg, foot[found], theta[found])
     A, E = bases(leg)
-    AB, BC, BF = p.B - A, p.C_left - p.B, p.F - p.B
-    ED, DC = p.D - E, p.C_right - p.D
+    AB = p.B - A
+    BC = p.C_left - p.B
+    BF = p.F - p.B
+    ED = p.D - E
+    DC = p.C_right - p.D
     sines = np.abs([_sine(AB, BF), _sine(ED, DC), _sine(BC, DC)]).min(axis=0)
     sines[branch(leg, p).assembly != leg.assembly] = 0.0
     if not sines.size or not sines.max() > 0.0:
         return None
+
     best = int(np.argmax(sines.round(9)))  # rounded: equal ones differ by rounding only
     theta_A, theta_E = theta[found][best]
-    theta_B, theta_D = angle_between(AB[best], BC[best]), angle_between(ED[best], DC[best])
+    theta_B = angle_between(AB[best], BC[best])
+    theta_D = angle_between(ED[best], DC[best])
+
     return np.array([theta_A, theta_B, theta_E, theta_D])
 
 

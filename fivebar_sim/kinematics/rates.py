@@ -56,7 +56,11 @@ def jacobian(leg: FiveBar, theta: ArrayLike, assembly: int | None = None) -> Arr
     """
     A, E = bases(leg)
     p = closed_points(leg, theta, assembly)
-    AB, ED, BC, DC, CF = p.B - A, p.D - E, p.C_left - p.B, p.C_right - p.D, p.F - p.C_left
+    AB = p.B - A
+    ED = p.D - E
+    BC = p.C_left - p.B
+    DC = p.C_right - p.D
+    CF = p.F - p.C_left
     m = cross(BC, DC)
     _refuse(m / (leg.L2 * leg.L3), "B, C and D are in line")
 
@@ -66,6 +70,7 @@ def jacobian(leg: FiveBar, theta: ArrayLike, assembly: int | None = None) -> Arr
     psi_E = cross(BC, dC_E) / leg.L2**2
     dF_A = dC_A + psi_A[..., None] * perp(CF)
     dF_E = dC_E + psi_E[..., None] * perp(CF)
+
     return np.stack([dF_A, dF_E], axis=-1)
 
 
@@ -118,6 +123,7 @@ def joint_motion(
     q = (theta[..., 0], angle_between(AB, BC), theta[..., 1], angle_between(ED, DC))
     q_dot = (A_dot[0], A_dot[1] - A_dot[0], E_dot[0], E_dot[1] - E_dot[0])
     q_ddot = (A_ddot[0], A_ddot[1] - A_ddot[0], E_ddot[0], E_ddot[1] - E_ddot[0])
+
     return JointMotion(np.stack(q, -1), np.stack(q_dot, -1), np.stack(q_ddot, -1))
 
 
@@ -135,7 +141,8 @@ def _side_motion(r1: Array, r2: Array, v: Array, a: Array, where: str) -> tuple[
     """
     k = cross(r1, r2)
     _refuse(k / np.sqrt(dot(r1, r1) * dot(r2, r2)), where)
-    rate_1, rate_2 = dot(r2, v) / k, -dot(r1, v) / k
+    rate_1 = dot(r2, v) / k
+    rate_2 = -dot(r1, v) / k
     w = a + r1 * (rate_1**2)[..., None] + r2 * (rate_2**2)[..., None]
     return (rate_1, rate_2), (dot(r2, w) / k, -dot(r1, w) / k)
 

@@ -43,7 +43,8 @@ def side_angle(r: Array, near: float, far: float, s: int) -> tuple[Array, Bools]
 def _side_angle(x: Array, z: Array, near: float, far: float, s: int) -> tuple[Array, Bools]:
     """Return what `side_angle` does, of separate coordinates."""
     d2 = x * x + z * z
-    low, high = (near - far) ** 2, (near + far) ** 2
+    low = (near - far) ** 2
+    high = (near + far) ** 2
     N = d2 + (near - far) * (near + far)
     S = s * np.sqrt(np.maximum((high - d2) * (d2 - low), 0.0))
     theta = direction(z * N + S * x, x * N - S * z)
@@ -52,7 +53,8 @@ def _side_angle(x: Array, z: Array, near: float, far: float, s: int) -> tuple[Ar
 
 def reaches(d2: Array, near: float, far: float) -> Bools:
     """Return where a chain of two links spans a squared distance [m^2], but for its rounding."""
-    low, high = (near - far) ** 2, (near + far) ** 2
+    low = (near - far) ** 2
+    high = (near + far) ** 2
     slack = ROUNDING * high
     return (d2 >= low - slack) & (d2 <= high + slack)
 
@@ -69,12 +71,16 @@ def _solve(
     """Return (theta_A, theta_E) of points (n, 2), and where each side reaches: A to F, E to C."""
     A, E = bases(leg)
     rho, phi = foot_radius_and_angle(leg)
-    x, z = foot[:, 0], foot[:, 1]
+    x = foot[:, 0]
+    z = foot[:, 1]
     theta_A, ok_A = _side_angle(x - A[0], z - A[1], leg.L1, rho, mode[0])
+
     if leg.L6 > 0.0:
         B = A + leg.L1 * unit(theta_A)
         C = B + (leg.L2 / rho) * turned(foot - B, -phi)
-        x, z = C[:, 0], C[:, 1]
+        x = C[:, 0]
+        z = C[:, 1]
+
     theta_E, ok_E = _side_angle(x - E[0], z - E[1], leg.L4, leg.L3, mode[1])
     return (theta_A, theta_E), (ok_A, ok_E)
 
@@ -85,13 +91,15 @@ def solve(leg: FiveBar, foot: Array, mode: Mode) -> tuple[Array, Bools]:
     Both (..., 2); angles of a side that does not reach mean nothing.
     """
     flat = foot.reshape(-1, 2)
-    theta, ok = np.empty(flat.shape), np.empty(flat.shape, dtype=bool)
+    theta = np.empty(flat.shape)
+    ok = np.empty(flat.shape, dtype=bool)
     with np.errstate(over="ignore", invalid="ignore"):  # infinitely far is out of reach
         for start in range(0, len(flat), BLOCK):
             block = slice(start, start + BLOCK)
             angles, reached = _solve(leg, flat[block], mode)
             for side in (0, 1):
-                theta[block, side], ok[block, side] = angles[side], reached[side]
+                theta[block, side] = angles[side]
+                ok[block, side] = reached[side]
     return theta.reshape(foot.shape), ok.reshape(foot.shape)
 
 
@@ -114,7 +122,8 @@ def inverse(leg: FiveBar, foot: ArrayLike, mode: Mode | None = None) -> Array:
             <= |ED| + |DC| for every point; `.index` is the first that is not.
         ArgumentError: Unknown mode, or a shape other than (..., 2).
     """
-    mode, foot = working_mode(leg, mode), as_pairs(foot, "foot")
+    mode = working_mode(leg, mode)
+    foot = as_pairs(foot, "foot")
     theta, ok = solve(leg, foot, mode)
     if not ok.all():
         raise out_of_reach(leg, foot, theta, ok)
@@ -136,12 +145,20 @@ def out_of_reach(leg: FiveBar, foot: Array, theta: Array, ok: Bools) -> Unreacha
     A, E = bases(leg)
     rho, phi = foot_radius_and_angle(leg)
     F = foot[index]
+
     if not ok[index][0]:
-        what, near, far, r = "|AF|", leg.L1, rho, F - A
+        what = "|AF|"
+        near = leg.L1
+        far = rho
+        r = F - A
     else:
         B = A + leg.L1 * unit(theta[index][0])
         C = B + (leg.L2 / rho) * turned(F - B, -phi) if leg.L6 > 0.0 else F
-        what, near, far, r = ("|EC|" if leg.L6 > 0.0 else "|EF|"), leg.L4, leg.L3, C - E
+        what = "|EC|" if leg.L6 > 0.0 else "|EF|"
+        near = leg.L4
+        far = leg.L3
+        r = C - E
+
     count = f"{int(bad.sum())} of {bad.size} points are" if bad.ndim else "the point is"
     return UnreachableError(
         f"{count} out of reach: {what} must be in [{abs(near - far):g}, {near + far:g}] m, got "
@@ -199,20 +216,24 @@ def inverse_nearest(leg: FiveBar, foot: ArrayLike, theta_now: ArrayLike) -> Arra
         UnreachableError: Where no working mode reaches; `.index` is the first such point.
         ArgumentError: Shapes that do not broadcast, or angles that are not finite.
     """
-    foot, now = as_pairs(foot, "foot"), as_pairs(theta_now, "theta_now")
+    foot = as_pairs(foot, "foot")
+    now = as_pairs(theta_now, "theta_now")
     try:
         foot, now = np.broadcast_arrays(foot, now)
     except ValueError:
         raise ArgumentError(
             f"foot and theta_now must broadcast, got shapes {foot.shape} and {now.shape}"
         ) from None
+
     if not np.isfinite(now).all():
         raise ArgumentError("theta_now must be finite [rad]")
+
     step = wrap(inverse_all(leg, foot) - now[..., None, :])
     cost = np.sum(step**2, axis=-1)
     lost = np.isnan(cost).all(axis=-1)
     if lost.any():
         theta, ok = solve(leg, foot, leg.mode)
         raise out_of_reach(leg, foot, theta, ok | ~lost[..., None])
+
     best = np.argmin(np.where(np.isnan(cost), np.inf, cost), axis=-1)
     return now + np.take_along_axis(step, best[..., None, None], axis=-2)[..., 0, :]

@@ -78,12 +78,16 @@ class SerialLeg:
         sign = self.knee if knee is None else knee
         if sign not in (-1, 1):
             raise ArgumentError(f"knee must be -1 or 1, got {sign!r}")
+
         F = as_pairs(foot, "foot") + 0.0  # -0.0 would be a direction of its own
         with np.errstate(over="ignore", invalid="ignore"):  # 1e200 m is as far as inf
             theta_A, ok = side_angle(F, self.L1, self.L2, sign)
+
         if not ok.all():
-            low, high = abs(self.L1 - self.L2), self.L1 + self.L2
+            low = abs(self.L1 - self.L2)
+            high = self.L1 + self.L2
             raise _unreachable("|AF|", np.hypot(F[..., 0], F[..., 1]), ~ok, low, high)
+
         AB = self.L1 * unit(theta_A)
         return np.stack([theta_A, angle_between(AB, F - AB)], axis=-1)
 
@@ -128,7 +132,8 @@ class SerialLeg:
         """
         AB, BF = self._links(theta)
         BF, F = together(theta=BF, force=finite(as_pairs(force, "force"), "force"))
-        tau_A, tau_B = -cross(AB + BF, F), -cross(BF, F)
+        tau_A = -cross(AB + BF, F)
+        tau_B = -cross(BF, F)
         return np.stack([tau_A - tau_B if belt else tau_A, tau_B], axis=-1)
 
     def _links(self, theta: ArrayLike) -> tuple[Array, Array]:
@@ -253,7 +258,8 @@ def _hip_angle(q1: ArrayLike) -> Array:
     angle = _numbers(q1, "q1")
     beyond = np.logical_not(np.abs(angle) <= 0.5 * np.pi)
     if beyond.any():
-        got, where = float(angle[beyond].flat[0]), at(first_index(beyond))
+        got = float(angle[beyond].flat[0])
+        where = at(first_index(beyond))
         raise ArgumentError(f"q1 must be in [-pi/2, pi/2] rad, got {got:g} rad{where}")
     return angle
 

@@ -102,5 +102,6 @@ def shown(key: str, value: float | None) -> str:
         return "undefined"
     number = scale * value
     while 0.0 < abs(number) < 0.01 and unit in SMALLER:
-        number, unit = 1e3 * number, SMALLER[unit]
+        number = 1e3 * number
+        unit = SMALLER[unit]
     return f"{number:.4g} {unit}".strip()

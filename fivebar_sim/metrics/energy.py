@@ -132,10 +132,12 @@ class _Motion(NamedTuple):
         """Return the motion of a record that began at rest."""
         q = np.stack([record[f"theta_{joint}"] for joint in JOINTS], axis=-1)
         v = np.stack([record[f"theta_dot_{joint}"] for joint in JOINTS], axis=-1)
-        q, v = _begun(start[-4:], q), _begun(np.zeros(4), v)
+        q = _begun(start[-4:], q)
+        v = _begun(np.zeros(4), v)
         hip, hip_dot = np.zeros((2, len(q)))
         if "hip_z" in record:
-            hip, hip_dot = _begun(start[0], record["hip_z"]), _begun(0.0, record["hip_dot_z"])
+            hip = _begun(start[0], record["hip_z"])
+            hip_dot = _begun(0.0, record["hip_dot_z"])
         return cls(q, v, hip, hip_dot, 0.5 * (v[1:] + v[:-1]), 0.5 * (hip_dot[1:] + hip_dot[:-1]))
 
 
@@ -147,7 +149,9 @@ def balance(body: Body, record: Mapping[str, Array], steps: Steps) -> Balance:
         record: The columns of rollout.parquet.
         steps: What acted besides the motors.
     """
-    leg, h, m = body.leg, float(record["time"][0]), _Motion.of(record, steps.start)
+    leg = body.leg
+    h = float(record["time"][0])
+    m = _Motion.of(record, steps.start)
     kinetic, potential = mechanical(
         body, m.q - 0.5 * h * m.v, m.v, m.hip - 0.5 * h * m.hip_dot, m.hip_dot
     )
@@ -155,11 +159,15 @@ def balance(body: Body, record: Mapping[str, Array], steps: Steps) -> Balance:
     foot = foot_rates(leg, m.q[:-1], m.w)
     none = np.zeros(len(m.w))
     ground = none
+
     if "ground_z" in record:
         height = m.hip[:-1] + kinematics.chain_points(leg, m.q[:-1]).F[:, 1] - leg.foot_radius
         rolled = contact_radius(leg, height) * (m.w[:, 0] + m.w[:, 1])
-        x, z = foot[:, 0] + rolled, foot[:, 1] + m.lift  # of the point of contact
+        # of the point of contact
+        x = foot[:, 0] + rolled
+        z = foot[:, 1] + m.lift
         ground = h * (record["ground_x"] * x + record["ground_z"] * z)
+
     joints = np.column_stack([m.lift, m.w]) if "hip_z" in record else m.w
     return Balance(
         motor=h * np.sum(torque * m.w[:, [0, 2]], axis=-1),
@@ -180,12 +188,16 @@ def _given_away(body: Body, m: _Motion) -> Array:
     """
     chain = Chain.of(body.leg, None, body.payload)
     p = _open_pose(m.q[:-1])
-    v, w, still = _of_links(m.v[:-1]), _of_links(m.w), (0.0, 0.0, 0.0, 0.0)
-    at_start, meant = chain.link_torques(p, v, still), chain.link_torques(p, w, still)
+    v = _of_links(m.v[:-1])
+    w = _of_links(m.w)
+    still = (0.0, 0.0, 0.0, 0.0)
+    at_start = chain.link_torques(p, v, still)
+    meant = chain.link_torques(p, w, still)
     links = sum((c - d) * rate for c, d, rate in zip(at_start, meant, w, strict=True))
     hip = sum(
         r[1] * (a * a - b * b) for r, a, b in zip(chain.moments(p), v, w, strict=True)
     )  # fmt: skip
+
     return np.asarray(hip * m.lift - links)
 
 
@@ -204,7 +216,8 @@ def mechanical(
         hip_dot: Its rate [m/s], (...).
     """
     chain = Chain.of(body.leg, None, body.payload)
-    p, w = _open_pose(q), _of_links(v)
+    p = _open_pose(q)
+    w = _of_links(v)
     kinetic, potential = chain.energies(p, w)
     mass = body.trunk + body.payload + sum(link.mass for link in body.leg.links)
     momentum = sum(r[0] * rate for r, rate in zip(chain.moments(p), w, strict=True))
@@ -225,7 +238,10 @@ def foot_rates(leg: FiveBar, q: Array, v: Array) -> Array:
         q: Joint angles as in `mechanical` [rad], (..., 4).
         v: Their rates [rad/s], (..., 4).
     """
-    psi_1, psi_2, w1, w2 = q[..., 0], q[..., 0] + q[..., 1], v[..., 0], v[..., 0] + v[..., 1]
+    psi_1 = q[..., 0]
+    psi_2 = q[..., 0] + q[..., 1]
+    w1 = v[..., 0]
+    w2 = v[..., 0] + v[..., 1]
     AB = leg.L1 * np.cos(psi_1), leg.L1 * np.sin(psi_1)
     BF = placed((np.cos(psi_2), np.sin(psi_2)), leg.foot_offset)
     return np.stack([-AB[1] * w1 - BF[1] * w2, AB[0] * w1 + BF[0] * w2], axis=-1)

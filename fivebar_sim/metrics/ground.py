@@ -59,8 +59,10 @@ def measure(leg: FiveBar, record: Mapping[str, Array], window: slice) -> dict[st
         record: The columns of rollout.parquet.
         window: The rows that load is measured over.
     """
-    down, h = stands(record), float(record["time"][0])
+    down = stands(record)
+    h = float(record["time"][0])
     slip = np.concatenate([[0.0], np.abs(slid(leg, record)) * down[1:]])[window]
+
     return {
         "force_max": {
             "x": float(np.abs(record["ground_x"]).max()),

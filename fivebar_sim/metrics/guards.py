@@ -82,7 +82,8 @@ class Guard(NamedTuple):
     def __str__(self) -> str:
         """Return what it says where it tripped: the bound, when, and the worst of the run."""
         what, worst, scale = SAID[self.name]
-        high, value = scale * self.high, scale * (self.value or 0.0)
+        high = scale * self.high
+        value = scale * (self.value or 0.0)
         said = f"{what.format(high)} at t = {self.time:g} s{worst.format(value)}"
         return f"guard {self.name}: {said}"
 
@@ -159,6 +160,7 @@ def judge(
     if "ground_z" in record:
         depth = np.maximum(-ground.height(leg, record), 0.0)
         found.append(_highest("ground", depth, bounds.ground * 2.0 * leg.foot_radius, time))
+
     return found
 
 

@@ -98,7 +98,8 @@ def measure(
 def _steps(torque: ArrayLike, theta: ArrayLike, timestep: float) -> _Steps:
     """Return the steps of a window, checked."""
     check_number("timestep", timestep, "s", low=0.0, high=LARGEST, strict=True)
-    tau, angles = _pairs(torque, "torque", "N m"), _pairs(theta, "theta", "rad")
+    tau = _pairs(torque, "torque", "N m")
+    angles = _pairs(theta, "theta", "rad")
     if not len(tau):
         raise ArgumentError("torque must have at least one row, got none")
     if len(angles) != len(tau) + 1:
@@ -106,16 +107,22 @@ def _steps(torque: ArrayLike, theta: ArrayLike, timestep: float) -> _Steps:
             f"theta must have one row more than torque, before and after every step: shape "
             f"{(len(tau) + 1, 2)}, got {angles.shape}"
         )
+
     work = tau * np.diff(angles, axis=0)
     return _Steps(tau, work, _against(work), float(np.abs(tau).max()), timestep)
 
 
 def _over(steps: _Steps, chosen: Bools) -> dict[str, Any]:
     """Return the measures over the chosen steps, of which there is at least one."""
-    tau, work, against = steps.torque[chosen], steps.work[chosen], steps.against & chosen
+    tau = steps.torque[chosen]
+    work = steps.work[chosen]
+    against = steps.against & chosen
     floor = TINY * steps.peak
-    rms, peak = _rms(tau), np.abs(tau).max(axis=0)
-    given, taken = np.maximum(work, 0.0).sum(axis=0), np.minimum(work, 0.0).sum(axis=0)
+    rms = _rms(tau)
+    peak = np.abs(tau).max(axis=0)
+    given = np.maximum(work, 0.0).sum(axis=0)
+    taken = np.minimum(work, 0.0).sum(axis=0)
+
     return {
         "torque_rms": _named(rms),
         "torque_peak": _named(peak),
@@ -139,17 +146,21 @@ def _histogram(steps: _Steps, phase: ArrayLike, bins: int) -> dict[str, Any]:
     """Return share_A and torque_rms in bins of the gait phase, a list of each."""
     if not isinstance(bins, (int, np.integer)) or not 1 <= bins <= BINS_MAX:
         raise ArgumentError(f"bins must be a whole number in [1, {BINS_MAX}], got {bins!r}")
+
     shape = (len(steps.torque),)
     cycle = _numbers(phase, "phase")
     if cycle.shape != shape:
         raise ArgumentError(f"phase must have shape {shape}, got {cycle.shape}")
+
     bad = ~((cycle >= 0.0) & (cycle < 1.0))
     if bad.any():
         i = first_index(bad)
         raise ArgumentError(f"phase must be in [0, 1), got {float(cycle[i])!r}{at(i)}")
+
     bin_of = (cycle * bins).astype(int)  # below bins: the float before 1 does not round up to it
     parts = [steps.torque[bin_of == i] for i in range(bins)]
     rms = [_named(_rms(part)) if len(part) else dict.fromkeys(MOTORS) for part in parts]
+
     return {
         "share_A": [_share(part, TINY * steps.peak, 1) for part in parts],
         "torque_rms": {motor: [each[motor] for each in rms] for motor in MOTORS},
@@ -211,7 +222,8 @@ def _pairs(values: ArrayLike, name: str, unit: str) -> Array:
         raise ArgumentError(f"{name} must have shape (N, 2), got {pairs.shape}")
     bad = np.logical_not(np.abs(pairs) <= LARGEST)
     if bad.any():
-        i, most = first_index(bad), f"{LARGEST:g}"
+        i = first_index(bad)
+        most = f"{LARGEST:g}"
         raise ArgumentError(
             f"{name} must be in [-{most}, {most}] {unit}, got {float(pairs[i])!r}{at(i)}"
         )

@@ -107,6 +107,7 @@ class Csv(FootPath, frozen=True, tag="csv", dict=True):
                     f"lasts, got {self.ramp:g} s"
                 )
             return _Curve(CubicSpline(*track, bc_type="not-a-knot"), track.span, None)
+
         time, foot = _closed(track, self.given, self.file)
         return _Curve(CubicSpline(time, foot, bc_type="periodic"), track.span, float(time[-1]))
 
@@ -120,11 +121,14 @@ def _closed(track: Track, period: float | None, where: str) -> Track:
         raise ConfigError(
             f"{where}: a periodic path needs at least 3 distinct points, got {distinct}"
         )
+
     if period is None:
         period = span if track.closed else span + float(np.median(np.diff(time)))
+
     same = math.isclose(period, span, rel_tol=TIME_ROUNDING)
     if same and track.closed:
         return Track(time, np.concatenate([foot[:-1], foot[:1]]))
+
     if same or not period > span:
         relation = ">=" if track.closed else ">"
         raise ConfigError(

@@ -96,13 +96,18 @@ class Gait(Cyclic, frozen=True, tag="gait"):
         turn round.
         """
         cycle = self._cycle(self._times(time))
-        duty, half = self.duty, 0.5 * self.stride
-        stands, swing = cycle < duty, np.maximum(cycle, duty)
-        (cx, cz), slope = self.centre, -self.stride / duty
+        duty = self.duty
+        half = 0.5 * self.stride
+        stands = cycle < duty
+        swing = np.maximum(cycle, duty)
+        cx, cz = self.centre
+        slope = -self.stride / duty
         x, dx, ddx = pieces([(duty, cx - half, slope, 0.0), (1.0, cx + half, slope, 0.0)], swing)
         z, dz, ddz = pieces(arch(duty, 1.0, cz, self.lift, self.touchdown * self.period), swing)
         x = np.where(stands, cx + half + slope * cycle, x)
-        dx, ddx = np.where(stands, slope, dx), np.where(stands, 0.0, ddx)
+        dx = np.where(stands, slope, dx)
+        ddx = np.where(stands, 0.0, ddx)
+
         return Sample(
             position=np.stack([x, z], axis=-1),
             velocity=self.frequency * np.stack([dx, dz], axis=-1),

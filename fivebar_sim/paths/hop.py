@@ -75,6 +75,7 @@ class Hop(Cyclic, frozen=True, kw_only=True, tag="hop"):
             (1.0, -self.low, 0.0, 0.0),
         ]
         z, dz, ddz = pieces(knots, cycle)
+
         return Sample(
             position=np.stack([np.full_like(z, self.x), z], axis=-1),
             velocity=self.frequency * np.stack([np.zeros_like(z), dz], axis=-1),

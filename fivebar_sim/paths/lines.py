@@ -31,6 +31,7 @@ class Lines(FootPath, frozen=True, kw_only=True, tag="lines"):
         points = tuple(pair_of(f"points[{k}]", p, "m") for k, p in enumerate(self.points))
         if len(points) < 2:
             raise ArgumentError(f"points must be at least 2, got {len(points)}")
+
         seconds = self.seconds
         if isinstance(seconds, (tuple, list)):
             if len(seconds) != len(points) - 1:
@@ -43,6 +44,7 @@ class Lines(FootPath, frozen=True, kw_only=True, tag="lines"):
             msgspec.structs.force_setattr(self, "seconds", tuple(map(float, seconds)))
         else:
             check_number("seconds", seconds, "s", low=0.0, high=LONGEST, strict=True)
+
         msgspec.structs.force_setattr(self, "points", points)
         check_ramp(self)
 
@@ -60,11 +62,14 @@ class Lines(FootPath, frozen=True, kw_only=True, tag="lines"):
         the next line; it is 0 from the last point on. The acceleration is 0: the jumps, which are
         infinite ones, are not in it.
         """
-        t, knots, points = self._times(time), self._knots(), np.array(self.points)
+        t = self._times(time)
+        knots = self._knots()
+        points = np.array(self.points)
         k = np.clip(np.searchsorted(knots, t, side="right") - 1, 0, len(knots) - 2)
         speed = np.diff(points, axis=0) / np.diff(knots)[:, None]
         held = (t >= knots[-1])[..., None]
         position = points[k] + speed[k] * (t - knots[k])[..., None]
+
         return Sample(
             position=np.where(held, points[-1], position),
             velocity=np.where(held, 0.0, speed[k]),

@@ -37,18 +37,25 @@ def pieces(knots: list[Knot], t: Array) -> tuple[Array, Array, Array]:
     t0, p0, v0, a0 = knot[:-1].T
     t1, p1, v1, a1 = knot[1:].T
     T = t1 - t0
-    P, V, A = p1 - p0 - v0 * T - 0.5 * a0 * T**2, v1 - v0 - a0 * T, a1 - a0
+    P = p1 - p0 - v0 * T - 0.5 * a0 * T**2
+    V = v1 - v0 - a0 * T
+    A = a1 - a0
     c3 = (10.0 * P - 4.0 * V * T + 0.5 * A * T**2) / T**3
     c4 = (-15.0 * P + 7.0 * V * T - A * T**2) / T**4
     c5 = (6.0 * P - 3.0 * V * T + 0.5 * A * T**2) / T**5
 
     k = np.clip(np.searchsorted(knot[:, 0], t, side="right") - 1, 0, len(T) - 1)
     r = t - t0[k]
-    v0, a0, c3, c4, c5 = v0[k], a0[k], c3[k], c4[k], c5[k]
+    v0 = v0[k]
+    a0 = a0[k]
+    c3 = c3[k]
+    c4 = c4[k]
+    c5 = c5[k]
     p = p0[k] + r * (v0 + r * (0.5 * a0 + r * (c3 + r * (c4 + r * c5))))
     v = v0 + r * (a0 + r * (3.0 * c3 + r * (4.0 * c4 + r * 5.0 * c5)))
     a = a0 + r * (6.0 * c3 + r * (12.0 * c4 + r * 20.0 * c5))
     held = t >= t1[-1]
+
     return np.where(held, p1[-1], p), np.where(held, 0.0, v), np.where(held, 0.0, a)
 
 

@@ -93,10 +93,12 @@ class Line(Cyclic, frozen=True, tag="line"):
         h = tau**3 * (10.0 - 15.0 * tau + 6.0 * tau**2)
         dh = 30.0 * tau**2 * (1.0 - tau) ** 2
         ddh = 60.0 * tau * (1.0 - tau) * (1.0 - 2.0 * tau)
-        start, stop = np.array(self.start), np.array(self.stop)
+        start = np.array(self.start)
+        stop = np.array(self.stop)
         span = stop - start
         # from the nearer end: exact at both
         position = np.where(tau < 0.5, start + span * h, stop - span * (1.0 - h))
+
         return Sample(position, span * dh * tau_dot, span * ddh * tau_dot**2)
 
 
@@ -118,9 +120,15 @@ class FigureEight(_Harmonic, frozen=True, tag="figure-eight"):
 
     def nominal(self, time: ArrayLike) -> Sample:
         """Return x = cx + rx sin(wt), z = cz + rz sin(2wt), with rates; see `FootPath.nominal`."""
-        (cx, cz), (rx, rz), w = self.centre, self.radii, self.omega
+        cx, cz = self.centre
+        rx, rz = self.radii
+        w = self.omega
         phase = w * self._times(time)
-        sin, cos, sin2, cos2 = np.sin(phase), np.cos(phase), np.sin(2 * phase), np.cos(2 * phase)
+        sin = np.sin(phase)
+        cos = np.cos(phase)
+        sin2 = np.sin(2 * phase)
+        cos2 = np.cos(2 * phase)
+
         return Sample(
             position=np.stack([cx + rx * sin, cz + rz * sin2], axis=-1),
             velocity=w * np.stack([rx * cos, 2.0 * rz * cos2], axis=-1),
@@ -130,8 +138,10 @@ class FigureEight(_Harmonic, frozen=True, tag="figure-eight"):
 
 def _orbit(centre: Pair, radii: Pair, w: float, time: Array) -> Sample:
     """Return x = cx + rx sin(wt), z = cz - rz cos(wt) with its rates."""
-    (cx, cz), (rx, rz) = centre, radii
-    sin, cos = np.sin(w * time), np.cos(w * time)
+    cx, cz = centre
+    rx, rz = radii
+    sin = np.sin(w * time)
+    cos = np.cos(w * time)
     return Sample(
         position=np.stack([cx + rx * sin, cz - rz * cos], axis=-1),
         velocity=w * np.stack([rx * cos, rz * sin], axis=-1),

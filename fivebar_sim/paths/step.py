@@ -54,7 +54,8 @@ class Step(FootPath, frozen=True, kw_only=True, tag="step"):
         u = np.minimum(self._times(time) / self.seconds, 1.0)
         line = pieces([(0.0, 0.0, 0.0, 0.0), (1.0, 1.0, 0.0, 0.0)], u)
         bump = pieces(arch(0.0, 1.0, 0.0, self.lift), u)
-        up, span = np.array([0.0, 1.0]), np.array(self.stop) - np.array(self.start)
+        up = np.array([0.0, 1.0])
+        span = np.array(self.stop) - np.array(self.start)
         p, dp, ddp = (
             a[..., None] * span + b[..., None] * up for a, b in zip(line, bump, strict=True)
         )

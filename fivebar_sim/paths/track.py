@@ -63,6 +63,7 @@ def read_track(file: Path, headers: Headers, what: str) -> Track:
     lines = _lines(file, what)
     if not lines:
         raise ConfigError(f"{file}: no header; {_legal(headers)}")
+
     (number, header), *rows = lines
     order, scale = _columns(header, headers, f"{file}, line {number}")
     table = np.empty((len(rows), 3))
@@ -85,6 +86,7 @@ def read_track(file: Path, headers: Headers, what: str) -> Track:
                 f"{where}: times are too close: time_s must be at least {SHORTEST:g} s after that "
                 f"of line {rows[k - 1][0]}, got {float(table[k, 0])!r} s"
             )
+
     if len(rows) < 2:
         raise ConfigError(f"{file}: a {what} needs at least 2 rows, got {len(rows)}")
     return Track(table[:, 0] - table[0, 0], scale * table[:, 1:])
@@ -97,12 +99,14 @@ def _lines(file: Path, what: str) -> list[tuple[int, list[str]]]:
         raw = file.read_bytes()
     except OSError as error:
         raise ConfigError(f"cannot read {what} {file}: {error.strerror}") from None
+
     try:
         text = raw.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         number = raw.count(b"\n", 0, error.start) + 1
         byte = raw[error.start]
         raise ConfigError(f"{file}, line {number}: must be UTF-8, got byte 0x{byte:02x}") from None
+
     stripped = ((k, line.strip()) for k, line in enumerate(text.split("\n"), start=1))
     return [
         (k, [cell.strip() for cell in line.split(",")])
@@ -116,16 +120,19 @@ def _columns(header: list[str], headers: Headers, where: str) -> tuple[list[int]
     for legal, scale in headers.items():
         if sorted(header) == sorted(legal):
             return [header.index(name) for name in legal], scale
+
     known = {name for legal in headers for name in legal}
     nearest = max(headers, key=lambda legal: len(set(legal) & set(header)))
     strange = [name for name in header if name not in known]
     missing = [name for name in nearest if name not in header]
+
     if strange:
         problem = unknown("column", strange[0], known)
     elif missing:
         problem = f"no column {missing[0]!r}"
     else:
         problem = "too many columns"
+
     raise ConfigError(f"{where}: {problem}; {_legal(headers)}, got {','.join(header)!r}")
 
 

@@ -18,7 +18,8 @@ from fivebar_sim.recording.poses import Motion
 if TYPE_CHECKING:
     import rerun as rr
 
-TARGET, TARGET_PATH = f"{HIP}/target", f"{HIP}/target_path"
+TARGET = f"{HIP}/target"
+TARGET_PATH = f"{HIP}/target_path"
 TRAIL_SECONDS = 0.6
 """How long the trail of the foot stays [s]."""
 BACKGROUND: Colour = (24, 26, 30)
@@ -57,6 +58,7 @@ def log_foot(stream: rr.RecordingStream, target: Array, look: Look) -> None:
     stream.log(f"{look.root}{TARGET_PATH}", path, static=True)
     needle = rr.LineStrips3D.from_fields(radii=rr.Radius.ui_points(2.0), colors=[green])
     stream.log(f"{look.root}{TARGET}", needle, static=True)
+
     for band in TRAIL:
         line = rr.LineStrips3D.from_fields(
             radii=rr.Radius.ui_points(0.5 + 2.0 * band.fresh),

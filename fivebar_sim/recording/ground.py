@@ -14,8 +14,11 @@ from fivebar_sim.recording.poses import Motion, Stage
 if TYPE_CHECKING:
     import rerun as rr
 
-FLOOR, BELT, FORCE = "floor", "belt", "ground_force"
-MARGIN, WIDTH = 0.4, 0.6
+FLOOR = "floor"
+BELT = "belt"
+FORCE = "ground_force"
+MARGIN = 0.4
+WIDTH = 0.6
 """How far the floor reaches beyond the leg, and how wide it is, in sizes of the leg."""
 STRIPES = 8
 """Stripes across a belt."""
@@ -25,7 +28,9 @@ def log_floor(stream: rr.RecordingStream, stage: Stage) -> None:
     """Log the floor under all legs; its surface is at z = 0."""
     import rerun as rr
 
-    half, y, thick = 0.5 * _length(stage), 0.5 * WIDTH * stage.size, 0.01 * stage.size
+    half = 0.5 * _length(stage)
+    y = 0.5 * WIDTH * stage.size
+    thick = 0.01 * stage.size
     floor = rr.Boxes3D(
         centers=[[_start(stage) + half, 0.0, -thick]],
         half_sizes=[[half, y, thick]],
@@ -68,8 +73,10 @@ def send_ground(
             vectors=in_space(stage.metre_per_newton * moved.force[down]),
         )
         stream.send_columns(f"{look.root}{FORCE}", times, arrows.partition(down.astype(np.intp)))
+
     if moved.belt is not None:
-        gap, y = _length(stage) / STRIPES, 0.5 * WIDTH * stage.size
+        gap = _length(stage) / STRIPES
+        y = 0.5 * WIDTH * stage.size
         starts = _start(stage) + gap * np.arange(STRIPES)
         stripes = [[[x, -y, 0.0], [x, y, 0.0]] for x in starts]
         lines = rr.LineStrips3D(

@@ -60,6 +60,7 @@ def leg_view(stage: Stage, looks: Sequence[Look]) -> rrb.Spatial3DView:
         for look in looks
         for band in TRAIL
     }
+
     return rrb.Spatial3DView(
         origin="/",
         name="Leg",

@@ -74,7 +74,8 @@ def log_leg(stream: rr.RecordingStream, leg: FiveBar, look: Look) -> None:
     """Log what does not change: the links, each in its own frame, the base and the motors."""
     import rerun as rr
 
-    hip, r = f"{look.root}{HIP}", leg.radius
+    hip = f"{look.root}{HIP}"
+    r = leg.radius
     for name, side in (("L1", -1), ("L2", -1), ("L3", 1), ("L4", 1)):
         bars = [(0.0, getattr(leg, name), 0.0)]
         if name == "L2" and leg.L6 > 0.0:
@@ -110,6 +111,7 @@ def _log_base(stream: rr.RecordingStream, leg: FiveBar, look: Look) -> None:
     for joint, base, y in zip("AE", bases(leg), (-3.5 * r, 3.5 * r), strict=True):
         motor = _axle((base[0], y, base[1]), 3.0 * r, 2.0 * r, joint, GREY, look)
         stream.log(f"{look.root}{HIP}/{joint}", motor, static=True)
+
     if leg.L5 > 0.0:
         bar = rr.Capsules3D(
             lengths=[leg.L5],

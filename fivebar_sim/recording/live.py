@@ -59,7 +59,8 @@ def streaming(planned: Plan, address: str) -> Iterator[Watch]:
     with rrd.session():
         stream = rrd.started(planned.scenario.name)
         stream.connect_grpc(f"rerun+http://{address}/proxy")
-        sender, before = _Sender(planned, stream), sys.getswitchinterval()
+        sender = _Sender(planned, stream)
+        before = sys.getswitchinterval()
         sys.setswitchinterval(SWITCH)
         try:
             yield sender.put
@@ -80,6 +81,7 @@ def checked(address: str) -> str:
         raise ConfigError(f"--live-at takes HOST:PORT, as 127.0.0.1:9876, got {address!r}")
     if host.strip("[]") not in LOOPBACK:
         raise ConfigError(f"--live-at must be on this machine, {', '.join(LOOPBACK)}, got {host!r}")
+
     try:
         with socket.create_connection((host.strip("[]"), int(port)), timeout=ANSWER) as viewer:
             viewer.sendall(HELLO)
@@ -114,6 +116,7 @@ def spawned() -> str:
     with socket.socket() as free:
         free.bind((recording_viewer.LOOPBACK, 0))
         port = free.getsockname()[1]
+
     command = [str(recording_viewer.binary()), "--bind", recording_viewer.LOOPBACK]
     viewer = subprocess.Popen(
         [*command, "--port", str(port)],
@@ -128,6 +131,7 @@ def spawned() -> str:
             return checked(f"{recording_viewer.LOOPBACK}:{port}")
         except ConfigError:
             time.sleep(0.1)
+
     raise ConfigError("Rerun's viewer did not start to listen; is there a screen?")
 
 
@@ -135,9 +139,11 @@ class _Sender:
     """Sends states from a thread of its own, so that the physics need not wait."""
 
     def __init__(self, planned: Plan, stream: rr.RecordingStream) -> None:
-        self._planned, self._stream = planned, stream
+        self._planned = planned
+        self._stream = stream
         self._room = _room(planned)
-        self._begin, self._last = 0, None
+        self._begin = 0
+        self._last = None
         self._queue: queue.SimpleQueue[States | None] = queue.SimpleQueue()
         self._error: Exception | None = None
         self._thread = threading.Thread(target=self._work, daemon=True)
@@ -174,24 +180,31 @@ class _Sender:
         self._last = states.part(slice(-1, None))
 
     def _show(self, record: rrd.Record) -> None:
-        planned, stream, look = self._planned, self._stream, Look()
-        leg, h = planned.scenario.leg, planned.motion.timestep
+        planned = self._planned
+        stream = self._stream
+        look = Look()
+        leg = planned.scenario.leg
+        h = planned.motion.timestep
         plots = list(series(planned.scenario, record))
+
         if self._begin == 0:
             self._begin_recording(plots, look)
+
         rows = np.arange(0, len(record["time"]), max(1, round(1.0 / (RATE * h))))
         moved = motion(record, rows)
         at = rrd.times(record["time"][rows], self._begin + rows + 1)
         scene.send_leg(stream, leg, moved, look, at)
         foot.send_foot(stream, leg, moved, look, at)
         ground.send_ground(stream, leg, moved, look, at, self._room)
+
         for plot in plots:
             shown = plot.shown[rows]
             values = plot.values[(np.cumsum(plot.shown) - 1)[rows[shown]]]
             rrd.send_series(stream, plot._replace(values=values, shown=shown), look, at)
 
     def _begin_recording(self, plots: list[Series], look: Look) -> None:
-        planned, stream = self._planned, self._stream
+        planned = self._planned
+        stream = self._stream
         layout.send(stream, layout.contents(self._room, [look], [plots]))
         rrd.log_room(stream, self._room)
         text = f"# {planned.scenario.name}\n\nNo verdict yet: shown while it is simulated."
@@ -208,14 +221,18 @@ def _markdown(text: str) -> rr.TextDocument:
 
 def _room(planned: Plan) -> Stage:
     """Return the room that the planned motion needs; how large forces will be is not known yet."""
-    leg, record = planned.scenario.leg, planned.motion
+    leg = planned.scenario.leg
+    record = planned.motion
     every = slice(None, None, max(1, len(record.q) // 500))
     ground_scene = planned.scenario.scene
     hip = None
+
     if isinstance(ground_scene, Ground):
         hip = np.full(len(record.q[every]), planned.start[0])
+
     room = stage([leg], [Motion(record.q[every], record.foot[every], record.foot[every], hip)])
     if not isinstance(ground_scene, Ground):
         return room
+
     weight = 9.81 * (ground_scene.mass + sum(link.mass for link in leg.links))
     return room._replace(metre_per_newton=0.1 * leg.size / weight)

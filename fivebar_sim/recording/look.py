@@ -6,10 +6,18 @@ from typing import NamedTuple
 
 Colour = tuple[int, int, int]
 
-ORANGE, LIGHT_ORANGE = (224, 123, 57), (240, 173, 120)  # side A: L1, L2
-BLUE, LIGHT_BLUE = (52, 120, 190), (120, 175, 225)  # side E: L4, L3
-GREEN, RED, GREY, LIGHT_GREY = (60, 170, 90), (214, 69, 80), (96, 96, 102), (140, 140, 148)
-YELLOW, PURPLE = (226, 196, 60), (150, 70, 170)
+# side A: L1, L2
+ORANGE = (224, 123, 57)
+LIGHT_ORANGE = (240, 173, 120)
+# side E: L4, L3
+BLUE = (52, 120, 190)
+LIGHT_BLUE = (120, 175, 225)
+GREEN = (60, 170, 90)
+RED = (214, 69, 80)
+GREY = (96, 96, 102)
+LIGHT_GREY = (140, 140, 148)
+YELLOW = (226, 196, 60)
+PURPLE = (150, 70, 170)
 
 TINTS: tuple[Colour, ...] = (
     (240, 140, 40),

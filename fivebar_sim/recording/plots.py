@@ -68,7 +68,8 @@ def series(scenario: Scenario, record: Record) -> Iterator[Series]:
     Commands are drawn with what they are: angles with the joints, torques with the motors.
     """
     every = np.ones(len(record["time"]), dtype=bool)
-    error, torque = tracking_error(record), _columns(record, "torque_A", "torque_E")
+    error = tracking_error(record)
+    torque = _columns(record, "torque_A", "torque_E")
     share, loaded = load_share(torque, round(0.5 * SHARE_WINDOW / timestep(record["time"])))
     in_torque = getattr(scenario.controller, "drive", "position") == "torque"
 
@@ -81,6 +82,7 @@ def series(scenario: Scenario, record: Record) -> Iterator[Series]:
     angles = JOINTS if in_torque else JOINTS | COMMANDS
     title = "Joint angles [deg]" if in_torque else "Joint angles, setpoints [deg]"
     yield Series("angles", title, angles, np.degrees(_columns(record, *angles)), every)
+
     if "ground_z" in record:
         height = 1e3 * ground.height(scenario.leg, record)[:, None]
         force = points(record, "ground")
@@ -92,7 +94,8 @@ def _torques(
     scenario: Scenario, record: Record, torque: Array, every: Bools, *, in_torque: bool
 ) -> Iterator[Series]:
     """Yield the motor torques, the commanded ones of a torque drive, and the servo's limits."""
-    title, limit = "Motor torques [mN m]", scenario.servo.limit
+    title = "Motor torques [mN m]"
+    limit = scenario.servo.limit
     yield Series("torque", title, MOTORS, 1e3 * torque, every)
     if in_torque:
         yield Series(
@@ -124,7 +127,8 @@ def load_share(torque: Array, half: int) -> tuple[Array, Bools]:
         whose window the mean |tau| of one motor at least reaches `SHARE_FLOOR`.
     """
     k = np.arange(len(torque))
-    low, high = np.maximum(k - half, 0), np.minimum(k + half + 1, len(torque))
+    low = np.maximum(k - half, 0)
+    high = np.minimum(k + half + 1, len(torque))
     total = np.concatenate([np.zeros((1, 2)), np.cumsum(np.abs(torque), axis=0)])
     impulse = total[high] - total[low]
     loaded = impulse.max(axis=1) >= SHARE_FLOOR * (high - low)

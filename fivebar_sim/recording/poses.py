@@ -102,7 +102,8 @@ def stage(legs: Sequence[FiveBar], moved: Sequence[Motion]) -> Stage:
     floor = any(each.hip is not None for each in moved)
     if floor:
         places = np.concatenate([places, np.zeros((1, 2))])
-    size, largest = max(leg.size for leg in legs), float(max(forces, default=0.0))
+    size = max(leg.size for leg in legs)
+    largest = float(max(forces, default=0.0))
     scale = 0.5 * size / largest if largest > 0.0 else 0.0
     return Stage(places.min(axis=0), places.max(axis=0), size, scale, floor)
 

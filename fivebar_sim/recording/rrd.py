@@ -126,6 +126,7 @@ def _send(stream: rr.RecordingStream, runs: Sequence[Run], names: list[str]) -> 
     layout.send(stream, layout.contents(room, shown, plots))
     stream.log(layout.SUMMARY, rr.TextDocument(text, media_type="text/markdown"), static=True)
     log_room(stream, room)
+
     for run, look, poses, lines in zip(runs, shown, moved, plots, strict=True):
         _send_run(stream, run, look, poses, lines, room)
 
@@ -167,9 +168,11 @@ def _send_run(
     """Send one run: its leg as a property and in motion, the foot, the ground, the plots."""
     import rerun as rr
 
-    leg, time = run.scenario.leg, run.record["time"]
+    leg = run.scenario.leg
+    time = run.record["time"]
     rows = drawn_rows(time)
-    every, drawn = times(time, np.arange(len(time)) + 1), times(time[rows], rows + 1)
+    every = times(time, np.arange(len(time)) + 1)
+    drawn = times(time[rows], rows + 1)
     # as JSON, since a plain value keeps the type that it first had
     stream.send_property(f"{look.root}leg", rr.AnyValues(json=json.dumps(asdict(leg))))
     scene.log_leg(stream, leg, look)
@@ -177,6 +180,7 @@ def _send_run(
     foot.log_foot(stream, points(run.record, "target"), look)
     foot.send_foot(stream, leg, moved, look, drawn)
     ground.send_ground(stream, leg, moved, look, drawn, room)
+
     for plot in plots:
         send_series(stream, plot, look, every)
 

@@ -28,12 +28,14 @@ def summary(
         tripped = [f"- {said}" for said in guards.tripped(measured.get("guards", []))]
         lines += [*tripped, ""] if tripped else []
         lines += [*_limits(_judged(measured, own)), ""]
+
     names = [_cell(label) for label in labels] if len(labels) > 1 else ["value"]
     lines += [f"| metric | {' | '.join(names)} |", f"|:--|{'--:|' * len(names)}"]
     for key, (name, _, _) in SHOWN.items():
         values = [_value(measured, key) for measured in metrics]
         if any(values):
             lines.append(f"| {name} | {' | '.join(values)} |")
+
     for label, measured in zip(labels, metrics, strict=True):
         facts = ", ".join(
             f"{key} {_cell(value)}" for key, value in _flat(measured.get("provenance", {}))
@@ -60,7 +62,8 @@ def _limits(judged: Sequence[Limit]) -> Iterator[str]:
     yield "|:--|--:|--:|:--|"
     for limit in judged:
         verdict = "pass" if limit.ok else "**FAIL**"
-        name, value = SHOWN[limit.key][0], shown(limit.key, limit.value)
+        name = SHOWN[limit.key][0]
+        value = shown(limit.key, limit.value)
         yield f"| {name} | {bounds(limit)} | {value} | {verdict} |"
 
 

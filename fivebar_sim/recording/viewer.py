@@ -78,6 +78,7 @@ def web_files() -> dict[str, bytes]:
     )
     late = threading.Timer(PATIENCE, source.kill)
     late.start()
+
     try:
         port = _port(source)
         return {name: _fetched(port, name) for name in WEB_FILES}

@@ -141,7 +141,8 @@ class Handler(BaseHTTPRequestHandler):
     """Answers GET and HEAD for the paths of the table, asked by a loopback name."""
 
     server: Server  # pyright: ignore[reportIncompatibleVariableOverride]
-    server_version, sys_version = "fivebar", ""
+    server_version = "fivebar"
+    sys_version = ""
     timeout = 30.0
 
     def do_GET(self) -> None:
@@ -167,6 +168,7 @@ class Handler(BaseHTTPRequestHandler):
             self.send_header("Content-Length", str(len(page.body)))
             self.end_headers()
             return page
+
         return None
 
     def end_headers(self) -> None:

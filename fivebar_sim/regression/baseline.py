@@ -124,17 +124,20 @@ def read(path: Path) -> Baseline | None:
         raise ConfigError(f"cannot read baseline {path}: {error.strerror}") from None
     except (ValueError, RecursionError) as error:
         raise ConfigError(f"{path} is no baseline: not JSON: {error}") from None
+
     where = f"{path} is no baseline"
     if tables.is_deep(table):
         raise ConfigError(f"{where}: nested too deep")
     if not isinstance(table, dict):
         raise ConfigError(f"{where}: it must be a table, got {str(table)[:40]}")
+
     tables.check_keys(table, ("made", "metrics"), where)
     tables.check_finite(table, where)
     made = tables.convert(table.get("made"), Made, "made", where)
     metrics = table.get("metrics")
     if not isinstance(metrics, dict):
         raise ConfigError(f"{where}: metrics must be a table, got {metrics!r}")
+
     tables.check_keys(metrics, ABSOLUTE, f"{where}: metrics")
     each = {
         key: tables.convert(value, Recorded, f"metrics.{key}", where)

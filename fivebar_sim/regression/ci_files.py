@@ -32,6 +32,7 @@ def junit(checked: Sequence[Checked]) -> str:
             whys = [row.why] if row.why else []
             failed = row.verdict == FAIL
             _case(suite, each.name, row.key, *((whys, []) if failed else ([], whys)))
+
     counts = {
         "tests": len(suite),
         "failures": len(suite.findall("testcase/failure")),
@@ -40,6 +41,7 @@ def junit(checked: Sequence[Checked]) -> str:
     }
     for element in (suites, suite):
         element.attrib.update({key: str(count) for key, count in counts.items()})
+
     ElementTree.indent(suites)
     text = ElementTree.tostring(suites, encoding="unicode")
     return f'<?xml version="1.0" encoding="UTF-8"?>\n{text}\n'

@@ -13,7 +13,10 @@ from fivebar_sim.regression.baseline import Baseline, Recorded
 if TYPE_CHECKING:
     from fivebar_sim.rollout import Result
 
-PASS, FAIL, BETTER, NEW = "pass", "FAIL", "better", "new"
+PASS = "pass"
+FAIL = "FAIL"
+BETTER = "better"
+NEW = "new"
 
 
 class Row(NamedTuple):
@@ -74,7 +77,8 @@ class Checked(NamedTuple):
 
 def compare(result: Result, baseline: Baseline | None) -> Checked:
     """Return a run against its limits and its baseline."""
-    metrics, limits = result.metrics, {limit.key: limit for limit in result.limits}
+    metrics = result.metrics
+    limits = {limit.key: limit for limit in result.limits}
     recorded = baseline.metrics if baseline else {}
     rows = [
         _row(key, limits.get(key), recorded.get(key), metrics)
@@ -112,11 +116,14 @@ def _row(
 ) -> Row:
     """Return one metric, judged by its limit first."""
     now = look_up(metrics, key) if key.split(".")[0] in metrics else None
-    label, verdict, why = SHOWN[key][0], PASS, ""
+    label = SHOWN[key][0]
+    verdict = PASS
+    why = ""
     if recorded is not None:
         verdict, why = _against(key, recorded, now)
     if limit is not None and not limit.ok:
-        verdict, why = FAIL, f"{shown(key, now)}, limit {bounds(limit)}"
+        verdict = FAIL
+        why = f"{shown(key, now)}, limit {bounds(limit)}"
     return Row(key, limit, recorded, now, verdict, why and f"{label}: {why}")
 
 

@@ -98,13 +98,17 @@ class LegRun:
             raise ArgumentError(unknown("metric", key, known))
         if low is None and high is None:
             raise ArgumentError(f"{key} needs a bound: give low, high or both")
+
         if low is not None:
             check_number("low", low, "")
+
         if high is not None:
             check_number("high", high, "", low=-inf if low is None else low)
+
         tripped = guards.tripped(self.metrics["guards"])
         if tripped:
             raise AssertionError("\n  ".join([f"{self.scenario.name} fails:", *tripped]))
+
         allowed = (-inf if low is None else low, inf if high is None else high)
         (judged,) = judge(self.metrics, {key: allowed})
         if not judged.ok:
@@ -181,11 +185,13 @@ def driven(scenario: Scenario, controller: Setpoints | Feedback) -> Scenario:
             "controller must be a msgspec Struct with setpoints(), or with command(), drive and "
             f"period, got {controller!r}"
         )
+
     kind = type(controller)
     value = f"{kind.__module__}:{kind.__qualname__}"
     named = (name for name, entry in control.known().items() if entry.value == value)
     name = next(named, kind.__name__)
     scenario = msgspec.structs.replace(scenario, controller=controller, controller_name=name)
+
     try:
         tomli_w.dumps(scenario.table())
     except TypeError as error:

@@ -24,9 +24,11 @@ from fivebar_sim.render.replay import Replay, Span
 FORMATS = (".gif", ".mp4", ".png")
 FASTEST = {".gif": 50.0, ".mp4": 240.0, ".png": 240.0}
 """Most frames a second; viewers slow a GIF down that has more [1/s]."""
-LEAST, MOST = 64, 4096
+LEAST = 64
+MOST = 4096
 """Pixels along a side."""
-MOST_GIF, MOST_FRAMES = 250_000_000, 100_000
+MOST_GIF = 250_000_000
+MOST_FRAMES = 100_000
 """Pixels of all of a GIF's frames, which are held in memory; frames of a film, which are not."""
 SAMPLES = 8
 """Frames that a GIF's palette is made for."""
@@ -77,6 +79,7 @@ def check(replay: Replay, out: Path, film: Film) -> None:
     kind = out.suffix.lower()
     if kind not in FORMATS:
         raise ConfigError(f"cannot draw {out}: the picture must end in {', '.join(FORMATS)}")
+
     check_number("fps", film.fps, "1/s", low=0.1, high=FASTEST[kind], error=ConfigError)
     check_number("speed", film.speed, "", low=1e-4, high=1e4, error=ConfigError)
     for name in ("width", "height"):
@@ -84,10 +87,12 @@ def check(replay: Replay, out: Path, film: Film) -> None:
         check_number(name, pixels, "pixels", low=LEAST, high=MOST, error=ConfigError)
         if kind == ".mp4" and pixels % 2:
             raise ConfigError(f"{name} of a .mp4 must be even, got {pixels}")
+
     if film.at is not None:
         if kind != ".png":
             raise ConfigError(f"at is the moment of a .png, and {out} is none")
         check_number("at", film.at, "s", low=0.0, high=replay.duration, error=ConfigError)
+
     wanted = span(replay, kind).length * film.fps / film.speed
     most = MOST_GIF // (film.width * film.height) if kind == ".gif" else MOST_FRAMES
     if kind != ".png" and not wanted <= most:
@@ -113,8 +118,10 @@ def write(replay: Replay, out: Path, film: Film) -> int:
     kind = out.suffix.lower()
     part = span(replay, kind)
     times = moments(part, film)
+
     if kind == ".png":
         times = [0.5 * replay.duration if film.at is None else film.at]
+
     with whole_file.beside(out) as place, stage(replay, film.width, film.height) as drawn:
         frames = (drawn.frame(time) for time in times)
         if kind == ".png":
@@ -139,27 +146,32 @@ class Stage:
 
     def __init__(self, replay: Replay, width: int, height: int) -> None:
         self.camera = scene.fit(replay, width / height)
-        self._replay, self._rect = replay, mujoco.MjrRect(0, 0, width, height)
+        self._replay = replay
+        self._rect = mujoco.MjrRect(0, 0, width, height)
         scene.dress(replay, self.camera, max(width, height))
         model = replay.model
         model.vis.global_.offwidth, model.vis.global_.offheight = width, height
         self._data = mujoco.MjData(model)
         self.scene = mujoco.MjvScene(model, scene.GEOMS)
-        self._option, self._view = mujoco.MjvOption(), mujoco.MjvCamera()
+        self._option = mujoco.MjvOption()
+        self._view = mujoco.MjvCamera()
         self.camera.aim(self._view)
         self._gl = gl.context(gl.find(), width, height)
+
         try:
             self._gl.make_current()
             self._mjr = mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_100)
         except mujoco.FatalError as error:
             self._gl.free()
             raise ConfigError(f"cannot draw {width} x {height} pixels here: {error}") from None
+
         mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN, self._mjr)
 
     def frame(self, time: float) -> Frame:
         """Return the picture of a moment of the run [s], (height, width, 3)."""
         row = self._replay.row(time)
-        model, data = self._replay.model, self._data
+        model = self._replay.model
+        data = self._data
         data.qpos[:] = self._replay.qpos[row]
         mujoco.mj_forward(model, data)
         every = mujoco.mjtCatBit.mjCAT_ALL
@@ -169,6 +181,7 @@ class Stage:
         mujoco.mjr_render(self._rect, self.scene, self._mjr)
         pixels = np.empty((self._rect.height, self._rect.width, 3), np.uint8)
         mujoco.mjr_readPixels(pixels, None, self._rect, self._mjr)
+
         return np.ascontiguousarray(pixels[::-1])  # GL's rows go up
 
     def close(self) -> None:

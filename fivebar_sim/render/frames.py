@@ -90,6 +90,7 @@ def write_mp4(place: Path, frames: Iterable[Frame], fps: float) -> None:
     raw = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{width}x{height}", "-r", f"{fps:.9g}"]
     made = ["-an", "-pix_fmt", "yuv420p", "-movflags", "+faststart"]
     command = ["ffmpeg", "-y", "-loglevel", "error", *raw, "-i", "-", *made, str(place)]
+
     with tempfile.TemporaryFile() as said:
         try:
             program = subprocess.Popen(command, stdin=subprocess.PIPE, stderr=said)

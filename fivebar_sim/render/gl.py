@@ -52,6 +52,7 @@ def find() -> str:
     """
     if sys.platform != "linux":
         return "native"
+
     asked = os.environ.get("MUJOCO_GL", "").strip().lower()
     if asked in WAYS:
         if works(asked):
@@ -60,9 +61,11 @@ def find() -> str:
             f"cannot draw: MUJOCO_GL={asked} does not work here; install the Debian package "
             f"{WAYS[asked]}, or unset MUJOCO_GL"
         )
+
     for way in WAYS:
         if works(way):
             return way
+
     raise ConfigError(
         f"cannot draw: neither EGL nor OSMesa works here; install the Debian package "
         f"{' or '.join(WAYS.values())}"

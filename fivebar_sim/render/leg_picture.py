@@ -13,10 +13,12 @@ from fivebar_sim.errors import ConfigError
 from fivebar_sim.geometry import FiveBar
 from fivebar_sim.render import gl
 
-WIDTH, HEIGHT = 640, 480
+WIDTH = 640
+HEIGHT = 480
 GEOMS = 200
 """Room of a scene."""
-FAR, DOWN = 3.5, -9.0
+FAR = 3.5
+DOWN = -9.0
 """Where the camera is: distance from the hip in leg sizes, and elevation [degrees]."""
 
 
@@ -32,21 +34,26 @@ class LegPicture:
     """
 
     def __init__(self, model: mujoco.MjModel, leg: FiveBar) -> None:
-        self._model, self._data = model, mujoco.MjData(model)
-        self._size, self._rect = leg.size, mujoco.MjrRect(0, 0, WIDTH, HEIGHT)
+        self._model = model
+        self._data = mujoco.MjData(model)
+        self._size = leg.size
+        self._rect = mujoco.MjrRect(0, 0, WIDTH, HEIGHT)
         self._scene = mujoco.MjvScene(model, GEOMS)
-        self._option, self._camera = mujoco.MjvOption(), mujoco.MjvCamera()
+        self._option = mujoco.MjvOption()
+        self._camera = mujoco.MjvCamera()
         self._camera.type = mujoco.mjtCamera.mjCAMERA_FREE
         self._camera.azimuth, self._camera.elevation = 90.0, DOWN
         self._camera.distance = FAR * leg.size
         self._gl = gl.context(gl.find(), WIDTH, HEIGHT)
         self._freed = weakref.finalize(self, self._gl.free)  # at the latest before Python ends
+
         try:
             self._gl.make_current()
             self._mjr = mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_100)
         except mujoco.FatalError as error:
             self._freed()
             raise ConfigError(f"cannot draw {WIDTH} x {HEIGHT} pixels here: {error}") from None
+
         mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN, self._mjr)
 
     def taken(self, qpos: Array) -> NDArray[np.uint8]:
@@ -63,6 +70,7 @@ class LegPicture:
         mujoco.mjr_render(self._rect, self._scene, self._mjr)
         pixels = np.empty((HEIGHT, WIDTH, 3), np.uint8)
         mujoco.mjr_readPixels(pixels, None, self._rect, self._mjr)
+
         return np.ascontiguousarray(pixels[::-1])  # GL's rows go up
 
     def close(self) -> None:

@@ -71,7 +71,8 @@ class Replay(NamedTuple):
     @property
     def cycle(self) -> Span:
         """The last whole period of a periodic path, which loops; all of another run."""
-        period, window = self.scenario.path.period, self.scenario.window
+        period = self.scenario.path.period
+        window = self.scenario.window
         if period is None:
             return self.whole
         return Span(window.stop * self.scenario.sim.timestep - period, period)
@@ -100,9 +101,12 @@ def replay(scenario: Scenario, record: Record) -> Replay:
             raise RunDirectoryError(
                 f"no record of the scene {scenario.scene.kind!r}: it lacks the column {name}"
             )
+
     q = np.stack([record[name] for name in JOINT_COLUMNS], axis=-1)
     still = np.full(len(q), model.HIP_HEIGHT * scenario.leg.size)
-    hip, nothing = record["hip_z"] if grounded else still, np.zeros(len(q))
+    hip = record["hip_z"] if grounded else still
+    nothing = np.zeros(len(q))
+
     return Replay(
         scenario,
         model.build(scenario.leg, scene=scenario.scene),

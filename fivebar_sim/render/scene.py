@@ -17,21 +17,27 @@ from fivebar_sim import kinematics
 from fivebar_sim.arrays import Array
 from fivebar_sim.render.replay import Replay
 
-FIELD, DOWN = 20.0, 9.0
+FIELD = 20.0
+DOWN = 9.0
 """Of the camera: vertical field of view, and how far it looks down [degrees]."""
 MARGIN = 1.08
 """The picture's size over that of the motion."""
 TRAIL_SECONDS = 0.5
 """How long the trail of the foot stays [s]; never all of a period, or it would hide the path."""
-PATH_PARTS, TRAIL_PARTS = 160, 60
+PATH_PARTS = 160
+TRAIL_PARTS = 60
 SLATS = 8
 """Marks on a belt to either side of the leg."""
 GEOMS = 2000
 """Room of a scene."""
 
 Colour = tuple[float, float, float]
-GREEN, RED, PALE = (0.12, 0.60, 0.30), (0.84, 0.16, 0.24), (0.93, 0.78, 0.80)
-VIOLET, SLAT, PIN = (0.45, 0.15, 0.70), (0.50, 0.53, 0.57), (0.90, 0.91, 0.93)
+GREEN = (0.12, 0.60, 0.30)
+RED = (0.84, 0.16, 0.24)
+PALE = (0.93, 0.78, 0.80)
+VIOLET = (0.45, 0.15, 0.70)
+SLAT = (0.50, 0.53, 0.57)
+PIN = (0.90, 0.91, 0.93)
 
 
 class Camera(NamedTuple):
@@ -61,7 +67,9 @@ class Camera(NamedTuple):
         """Set a free camera of MuJoCo; its field of view is the model's."""
         camera.type = mujoco.mjtCamera.mjCAMERA_FREE
         camera.lookat[:] = self.centre
-        camera.distance, camera.azimuth, camera.elevation = self.distance, 90.0, -DOWN
+        camera.distance = self.distance
+        camera.azimuth = 90.0
+        camera.elevation = -DOWN
 
 
 def fit(replay: Replay, aspect: float) -> Camera:
@@ -74,7 +82,8 @@ def fit(replay: Replay, aspect: float) -> Camera:
         replay: The run.
         aspect: Width over height of the picture.
     """
-    leg, seen = replay.scenario.leg, replay.fitted()
+    leg = replay.scenario.leg
+    seen = replay.fitted()
     points = np.stack([seen[:, 0], np.zeros(len(seen)), seen[:, 1]], axis=-1)
     probe = Camera(np.zeros(3), 1.0, FIELD)
     right = np.array([1.0, 0.0, 0.0])
@@ -88,6 +97,7 @@ def fit(replay: Replay, aspect: float) -> Camera:
         (np.abs((points - centre) @ n) + pad) / t - depth
         for n, t in ((right, tangent * aspect), (up, tangent))
     ]
+
     return Camera(centre, float(np.max(needed)), FIELD)
 
 
@@ -112,6 +122,7 @@ def dress(replay: Replay, camera: Camera, pixels: int = 1024) -> None:
     material.texuniform[:] = 1
     material.texrepeat[:] = 0.5 / _square(replay)
     material.reflectance[:] = 0.0
+
     if not replay.ground.any():  # that of a leg in the air falls out of the picture's lower edge
         model.light_castshadow[:] = 0
 
@@ -137,13 +148,16 @@ def decorate(scene: mujoco.MjvScene, replay: Replay, row: int, eye: Array) -> No
     pen = _Pen(scene, eye, 1.6 * leg.foot_radius + leg.radius)
     _pins(pen, replay, row, hip)
     path = pen.before(_path(replay) + hip)  # the trail is thinner at its end, thicker at the foot
+
     for start, end in pairwise(path):
         pen.bar(start, end, 0.15 * leg.foot_radius, GREEN)
+
     trail = pen.before(_trail(replay, row) + hip)
     for k, (start, end) in enumerate(pairwise(trail)):
         part = (k + 1) / TRAIL_PARTS
         width = (0.08 + 0.24 * part) * leg.foot_radius
         pen.bar(start, end, width, _mix(PALE, RED, part))
+
     pen.ball(pen.before(replay.target[row] + hip), 0.5 * leg.foot_radius, GREEN)
     _force(pen, replay, row, hip)
     if replay.belt is not None:
@@ -174,7 +188,8 @@ def _pins(pen: _Pen, replay: Replay, row: int, hip: Array) -> None:
 
 def _force(pen: _Pen, replay: Replay, row: int, hip: Array) -> None:
     """Draw the ground's force on the foot; the largest of the run is as long as the leg."""
-    leg, force = replay.scenario.leg, replay.ground[row]
+    leg = replay.scenario.leg
+    force = replay.ground[row]
     largest = float(np.hypot(*replay.ground.T).max())
     if np.hypot(*force) > 0.01 * largest:
         start = replay.foot[row] + hip - (0.0, leg.foot_radius)
@@ -185,7 +200,8 @@ def _force(pen: _Pen, replay: Replay, row: int, hip: Array) -> None:
 def _belt(pen: _Pen, replay: Replay, row: int) -> None:
     """Draw marks on the belt that run with it, a whole number of them a period."""
     assert replay.belt is not None
-    size, period = replay.scenario.leg.size, replay.scenario.path.period
+    size = replay.scenario.leg.size
+    period = replay.scenario.path.period
     speed = abs(float(replay.belt[-1])) / replay.duration
     gap = 0.3 * size
     if period is not None and speed > 0.0:
@@ -212,7 +228,9 @@ class _Pen:
     """
 
     def __init__(self, scene: mujoco.MjvScene, eye: Array, front: float) -> None:
-        self._scene, self._eye, self._front = scene, eye, front
+        self._scene = scene
+        self._eye = eye
+        self._front = front
 
     def before(self, points: Array, times: float = 1.0) -> Array:
         """Return points (x, z) of the leg plane in front of it, (..., 2) to (..., 3)."""
@@ -231,7 +249,8 @@ class _Pen:
     def ball(self, centre: Array, radius: float, colour: Colour) -> None:
         """Add a sphere."""
         geom = self._new(mujoco.mjtGeom.mjGEOM_SPHERE, colour)
-        geom.size[:], geom.pos[:] = radius, centre
+        geom.size[:] = radius
+        geom.pos[:] = centre
 
     def pin(self, centre: Array, radius: float, colour: Colour) -> None:
         """Add a disc that faces +-y."""
@@ -250,7 +269,8 @@ class _Pen:
         rgba = np.array([*colour, 1.0], np.float32)
         mujoco.mjv_initGeom(geom, kind, np.ones(3), np.zeros(3), np.eye(3).ravel(), rgba)
         geom.category = mujoco.mjtCatBit.mjCAT_DECOR
-        geom.emission, geom.specular = 0.15, 0.0
+        geom.emission = 0.15
+        geom.specular = 0.0
         self._scene.ngeom += 1
         return geom
 

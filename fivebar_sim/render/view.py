@@ -40,15 +40,18 @@ def chosen(source: str) -> FiveBar | Scenario:
     Raises:
         ConfigError: Neither; or the file says something illegal.
     """
-    legs, scenarios = resources.shipped("models/legs"), resources.shipped("scenarios")
+    legs = resources.shipped("models/legs")
+    scenarios = resources.shipped("scenarios")
     if source in legs:
         return FiveBar.load(source)
     if source in scenarios:
         return Scenario.load(source)
+
     file = Path(source)
     if file.suffix != ".toml":
         known = unknown("leg or scenario", source, {**legs, **scenarios})
         raise ConfigError(f"{known}; or a path to a .toml")
+
     table = tables.read(file, "leg or scenario")
     return Scenario.load(source) if "path" in table else FiveBar.load(source)
 
@@ -110,6 +113,7 @@ def hold(leg: FiveBar, clock: Callable[[], float] = time.monotonic) -> None:
     built.actuator_ctrllimited[:] = True
     built.actuator_ctrlrange[:] = data.ctrl[:, None] + np.array([-SLIDER, SLIDER])
     middle = np.array([0.0, 0.0, (model.HIP_HEIGHT - 0.4) * leg.size])
+
     with _window(built, data, controls=True) as window:
         with window.lock():
             scene.Camera(middle, 2.0 * leg.size, built.vis.global_.fovy).aim(window.cam)
@@ -135,11 +139,13 @@ def _window(built: mujoco.MjModel, data: mujoco.MjData, *, controls: bool) -> It
         warnings.simplefilter("ignore")
         if not glfw.init():  # MuJoCo would end the process
             raise ConfigError("the viewer cannot open a window: the screen does not answer")
+
     try:
         from mujoco import viewer
 
         window = viewer.launch_passive(built, data, show_left_ui=False, show_right_ui=controls)
     except (RuntimeError, mujoco.FatalError) as error:
         raise ConfigError(f"the viewer cannot open a window: {error}") from None
+
     with window:
         yield window

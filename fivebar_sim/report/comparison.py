@@ -24,7 +24,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-COLOURS, STYLES = 8, ("-", "--", ":", "-.")
+COLOURS = 8
+STYLES = ("-", "--", ":", "-.")
 NAME = 0.19
 """Height of a name above a figure [in]."""
 
@@ -78,8 +79,10 @@ def _foot_paths(runs: Sequence[StoredRun]) -> Drawn:
     figure, ax = draw.plane(4.0 + NAME * len(runs))
     for run in runs:
         ax.plot(*(1e3 * points(run.record, "target")).T, color=colour("wash"), lw=4, alpha=0.35)
+
     for k, run in enumerate(runs):
         ax.plot(*(1e3 * points(run.record, "foot")).T, gid="run", **_look(k, runs))
+
     _legend(figure, ax, names(runs))
     return Drawn(
         "foot-path",
@@ -122,9 +125,11 @@ def _lines(
             ax.plot(run.record["time"][rows], values[rows], gid="run", **_look(k, runs))
         if worst:
             _by_powers(ax, [float(column(run).max()) for run in runs])
+
     axes[-1].set_xlim(0.0, max(float(run.record["time"][-1]) for run in runs))
     _legend(figure, axes[0], names(runs))
     alt = f"Lines over time of {', '.join(names(runs))}: {', '.join(columns)}."
+
     return Drawn(key, title, caption, alt, figure)
 
 
@@ -206,6 +211,7 @@ def _metrics(runs: Sequence[StoredRun]) -> str:
     for k, name in enumerate(names(runs)):
         tint = f"var(--run-{k % COLOURS + 1})"
         head.append(Cell(f'<span class="swatch" style="background: {tint}"></span>{text(name)}'))
+
     rows: list[list[object]] = [
         ["verdict", *(html.judged(run.metrics["verdict"] == "pass") for run in runs)],
         ["guards that tripped", *(_tripped(run) for run in runs)],
@@ -226,6 +232,7 @@ def _metrics(runs: Sequence[StoredRun]) -> str:
                 cell += f"<small>{html.judged(False, f', limit {bounds(limits[k][key])}')}</small>"
             row.append(Cell(cell))
         rows.append(row)
+
     return html.table("Below each value: its difference to the first run.", head, rows)
 
 

@@ -54,11 +54,14 @@ def envelope(values: Array, bins: int = BINS) -> NDArray[np.int64]:
     rows = len(values)
     if rows <= 2 * bins:
         return np.arange(rows)
+
     gap = np.isnan(values)
     edge = np.flatnonzero(np.diff(gap))
-    low, high = np.where(gap, np.inf, values), np.where(gap, -np.inf, values)
+    low = np.where(gap, np.inf, values)
+    high = np.where(gap, -np.inf, values)
     ends = np.linspace(0, rows, bins + 1).astype(int)
     kept = [0, rows - 1]
+
     for start, stop in pairwise(ends):
         kept += [start + int(low[start:stop].argmin()), start + int(high[start:stop].argmax())]
     return np.unique(np.concatenate([kept, edge, edge + 1]))
@@ -110,7 +113,8 @@ def plane(height: float) -> tuple[Figure, Axes]:
 
 def shade_unmeasured(ax: Axes, run: StoredRun) -> None:
     """Shade what tracking and load are not measured over: the ramp, and what follows the window."""
-    window, time = run.scenario.window, run.record["time"]
+    window = run.scenario.window
+    time = run.record["time"]
     before = [0.0, *time.tolist()]  # a row is the state at the end of its step
     for start, stop in ((0.0, before[window.start]), (before[window.stop], before[-1])):
         if stop > start:

@@ -73,7 +73,8 @@ def page(title: str, parts: Iterable[str]) -> str:
         title: Plain text.
         parts: HTML of its body, one after the other.
     """
-    light, dark = look.variables(False), look.variables(True)
+    light = look.variables(False)
+    dark = look.variables(True)
     head = f"""<!DOCTYPE html>
 <html lang="en">
 <head>
@@ -91,6 +92,7 @@ def page(title: str, parts: Iterable[str]) -> str:
 <body>
 """
     foot = f"<footer>Written by fivebar-sim {version('fivebar-sim')}.</footer>\n</body>\n</html>\n"
+
     return head + "\n".join(parts) + "\n" + foot
 
 

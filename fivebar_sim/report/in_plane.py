@@ -45,13 +45,16 @@ def foot_path(run: StoredRun) -> Drawn:
     figure, ax = draw.plane(4.4)
     ax.plot(*target.T, color=colour("muted"), lw=6.0, alpha=0.4, label="target")
     ends = np.linspace(0, len(foot) - 1, PIECES + 1).astype(int)
+
     for k, tint in enumerate(draw.time_colours(PIECES)):
         width = 3.4 - 2.4 * k / PIECES  # so that a later round does not hide an earlier one
         ax.plot(*foot[ends[k] : ends[k + 1] + 1].T, color=tint, lw=width)
+
     ax.plot(*foot[0], "o", color=colour("ink"), ms=5, label="start")
     ax.legend(loc="best")
     _time_bar(figure, ax, run.record["time"])
     rms = shown("tracking.rms", look_up(run.metrics, "tracking.rms"))
+
     return Drawn(
         "foot-path",
         "Foot path",
@@ -87,12 +90,14 @@ def _time_bar(figure: Figure, ax: Axes, time: Array) -> None:
 
 def leg_moments(run: StoredRun) -> Drawn:
     """Draw the leg at a dozen moments over its workspace."""
-    leg, rows = run.scenario.leg, moments(run)
+    leg = run.scenario.leg
+    rows = moments(run)
     figure, ax = draw.plane(4.9)
     deepest = _workspace(ax, run)
     q = np.stack([run.record[name][rows] for name in JOINT_COLUMNS], axis=-1)
     p = kinematics.chain_points(leg, q)
     A, E = kinematics.bases(leg)
+
     for k in range(len(rows)):
         last = k == len(rows) - 1
         look: dict[str, Any] = {"alpha": 1.0 if last else 0.3, "lw": 2.6 if last else 1.3}
@@ -101,9 +106,11 @@ def leg_moments(run: StoredRun) -> Drawn:
             ("E", (E, p.D[k], p.C_right[k])),
         ):
             ax.plot(*(1e3 * np.array(chain)).T, "o-", color=colour(name), ms=3, **look)
+
     ax.plot(*(1e3 * points(run.record, "foot")).T, color=colour("error"), lw=1.0)
     for letter, point in (("A", A), ("B", p.B[-1]), ("C", p.C_left[-1]), ("D", p.D[-1]), ("E", E)):
         ax.annotate(letter, tuple(1e3 * point), (4, 4), textcoords="offset points", weight="bold")
+
     times = run.record["time"][rows]
     return Drawn(
         "leg-moments",
@@ -123,10 +130,13 @@ def _workspace(ax: Axes, run: StoredRun) -> float:
     leg = run.scenario.leg
     surveyed = survey(leg, CELLS)
     deepest = float(surveyed.distance.max())
-    x, z = 1e3 * surveyed.x, 1e3 * surveyed.z
+    x = 1e3 * surveyed.x
+    z = 1e3 * surveyed.z
+
     for level in np.arange(BANDS) * deepest / BANDS:
         shade = {"levels": [level, np.inf], "colors": [colour("wash")], "alpha": 0.11}
         ax.contourf(x, z, surveyed.distance, **shade)
+
     for curves, name, width in (
         (workspace.boundary(leg, mode=leg.mode), "muted", 1.0),
         (workspace.singular_curves(leg, leg.mode), "singular", 1.3),
@@ -142,12 +152,16 @@ def moments(run: StoredRun) -> NDArray[np.int64]:
     The way is that of the first measured period, or of the whole run where there is no period or
     the foot hardly moves in it.
     """
-    window, period = run.scenario.window, run.scenario.path.period
+    window = run.scenario.window
+    period = run.scenario.path.period
     foot = points(run.record, "foot")
     way = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(foot, axis=0).T))])
-    first, last = 0, len(foot) - 1
+    first = 0
+    last = len(foot) - 1
+
     if period is not None:
         stop = min(window.start + round(period / run.scenario.sim.timestep), last)
         if way[stop] - way[window.start] > HARDLY * run.scenario.leg.size:
-            first, last = window.start, stop
+            first = window.start
+            last = stop
     return np.unique(np.searchsorted(way, np.linspace(way[first], way[last], MOMENTS)))

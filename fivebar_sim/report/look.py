@@ -119,6 +119,7 @@ def svg(figure: Figure, key: str, alt: str) -> str:
     inside = re.sub(r' d="[^"]*"', lambda found: _rounded(found[0]), inside)
     inside = re.sub(r"#[0-9a-f]{6}\b", lambda found: _VARIABLES.get(found[0], found[0]), inside)
     inside = re.sub(r"\n\s*", "\n", inside)
+
     return f'<svg role="img" aria-label="{escape(alt)}" viewBox="{box[1]}">{inside.strip()}'
 
 

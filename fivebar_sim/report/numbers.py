@@ -63,7 +63,8 @@ def torque_band(run: StoredRun, motor: str) -> tuple[Array, Array] | None:
     MuJoCo decides at the start of a step what the limit clips, so a step may end a little beyond.
     None is for a servo without a limit.
     """
-    servo, controller = run.scenario.servo, run.scenario.controller
+    servo = run.scenario.servo
+    controller = run.scenario.controller
     if servo.limit is None:
         return None
     drive = controller.drive if isinstance(controller, Feedback) else "position"

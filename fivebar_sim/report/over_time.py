@@ -25,18 +25,22 @@ IN_VIEW = 3.0
 
 def tracking_error(run: StoredRun) -> Drawn:
     """Draw the foot's distance from its target, its RMS and what 95 % of it stay below."""
-    error, most = tracking.tracking_error(run.record), numbers.percentile(run)
+    error = tracking.tracking_error(run.record)
+    most = numbers.percentile(run)
     rms = look_up(run.metrics, "tracking.rms") or 0.0
     scale, unit = draw.length_unit(float(error.max()))
     figure, (ax,) = draw.panels(1, height=2.9)
     draw.line(ax, run.record["time"], scale * error, "error")
     said = {"RMS": shown("tracking.rms", rms), "95 %": shown("tracking.rms", most)}
+
     for value, style, name in ((rms, "--", "RMS"), (most, ":", "95 %")):
         label = f"{name}: {said[name]}"
         ax.axhline(scale * value, color=colour("ink"), ls=style, lw=1.4, label=label)
+
     draw.shade_unmeasured(ax, run)
     ax.set(ylabel=f"|foot - target| [{unit}]", ylim=(0.0, draw.ceiling(scale * error)))
     figure.legend(loc="outside upper center", ncols=2)
+
     return Drawn(
         "tracking-error",
         "Tracking error",
@@ -54,13 +58,16 @@ def torque(run: StoredRun) -> Drawn:
     largest = max(float(np.abs(run.record[f"torque_{motor}"]).max()) for motor in "AE")
     for ax, motor in zip(axes, "AE", strict=True):
         _torque(ax, run, motor, largest)
+
     share = look_up(run.metrics, "load.share_A")
-    limit, said = run.scenario.servo.limit, ""
+    limit = run.scenario.servo.limit
+    said = ""
     if limit is not None:
         inside = limit <= IN_VIEW * largest
         said = f" The servo's limit is {shown('load.torque_peak.A', limit)} at rest" + (
             ": dash-dotted, at the rate of each moment." if inside else ", out of the picture."
         )
+
     rms, peak = (
         " and ".join(
             shown(f"load.torque_{kind}.{m}", look_up(run.metrics, f"load.torque_{kind}.{m}"))
@@ -80,22 +87,28 @@ def torque(run: StoredRun) -> Drawn:
 
 def _torque(ax: Axes, run: StoredRun, motor: str, largest: float) -> None:
     """Draw the torque of one motor; both have one scale."""
-    time, tau = run.record["time"], 1e3 * run.record[f"torque_{motor}"]
+    time = run.record["time"]
+    tau = 1e3 * run.record[f"torque_{motor}"]
     window = run.scenario.window
     rms, peak = (look_up(run.metrics, f"load.torque_{kind}.{motor}") for kind in ("rms", "peak"))
     part = look_up(run.metrics, "load.share_A")
     part = 1.0 - part if part is not None and motor == "E" else part
     draw.line(ax, time, tau, motor)
+
     for side in (-1.0, 1.0):
         ax.axhline(side * 1e3 * (rms or 0.0), color=colour("ink"), ls="--", lw=1.0)
+
     top = window.start + int(np.abs(tau[window]).argmax())
     ax.plot(time[top], tau[top], "o", mfc="none", mec=colour("ink"), ms=8, mew=1.4)
-    room, limit = 1.15e3 * largest or 1.0, run.scenario.servo.limit
+    room = 1.15e3 * largest or 1.0
+    limit = run.scenario.servo.limit
     band = numbers.torque_band(run, motor)
+
     if band is not None and limit is not None and limit <= IN_VIEW * largest:
         for edge in band:
             draw.line(ax, time, 1e3 * edge, "error", ls="-.", lw=1.0)
             room = max(room, 1.05e3 * float(np.abs(edge).max()))
+
     draw.shade_unmeasured(ax, run)
     said = f"RMS {shown('load.torque_rms.A', rms)}, peak {shown('load.torque_peak.A', peak)}"
     ax.set(ylabel=f"torque {motor} [mN m]", ylim=(-room, room))
@@ -109,10 +122,12 @@ def load_share(run: StoredRun) -> Drawn:
     figure, (ax,) = draw.panels(1, height=2.6)
     draw.line(ax, run.record["time"], 100.0 * numbers.share(run), "A", lw=1.6)
     ax.axhline(50.0, color=colour("muted"), lw=1.0)
+
     if whole is not None:
         label = f"over all that is measured: {said}"
         ax.axhline(100.0 * whole, color=colour("ink"), ls="--", lw=1.2, label=label)
         figure.legend(loc="outside upper center")
+
     draw.shade_unmeasured(ax, run)
     ax.set(ylabel="load share of A [%]", ylim=(0.0, 100.0))
     return Drawn(
@@ -134,6 +149,7 @@ def loop_gap(run: StoredRun) -> Drawn:
     draw.line(ax, run.record["time"], scale * gap, "gap")
     ax.set(ylabel=f"gap at C [{unit}]", ylim=(0.0, draw.ceiling(scale * gap)))
     ax.set_xlim(0.0, run.record["time"][-1])
+
     return Drawn(
         "loop-gap",
         "Loop gap",
@@ -148,19 +164,25 @@ def ground_contact(run: StoredRun) -> Drawn | None:
     """Draw the ground's force, the foot's height and when it stands; None without a ground."""
     if "ground_z" not in run.record:
         return None
-    time, stands = run.record["time"], ground.stands(run.record)
+
+    time = run.record["time"]
+    stands = ground.stands(run.record)
     height = 1e3 * ground.height(run.scenario.leg, run.record)
     figure, axes = draw.panels(3, 2, height=4.4)
+
     for name, axis in (("singular", "z"), ("gap", "x")):
         values: Array = run.record[f"ground_{axis}"]
         draw.line(axes[0], time, values, name, label=f"force along {axis}")
+
     draw.line(axes[1], time, height, "ink")
     for ax in axes:
         draw.shade_stance(ax, time, stands)
+
     axes[0].set(ylabel="force on the foot [N]")
     axes[1].set(ylabel="foot height [mm]", xlim=(0.0, time[-1]))
     figure.legend(loc="outside upper center", ncols=2)
     share = shown("ground.stance_share", look_up(run.metrics, "ground.stance_share"))
+
     return Drawn(
         "ground",
         "Ground",

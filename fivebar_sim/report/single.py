@@ -47,8 +47,10 @@ def page(run: StoredRun, drawn: list[Drawn]) -> str:
 
 def _head(run: StoredRun) -> str:
     """Return name, verdict and a sentence about the run."""
-    scenario, metrics = run.scenario, run.metrics
-    window, h = scenario.window, scenario.sim.timestep
+    scenario = run.scenario
+    metrics = run.metrics
+    window = scenario.window
+    h = scenario.sim.timestep
     good = metrics["verdict"] == "pass"
     about = (
         f"The leg {scenario.leg.name} follows a path of kind {scenario.path.__struct_config__.tag} "
@@ -59,6 +61,7 @@ def _head(run: StoredRun) -> str:
     )
     tripped = [f'<p class="fail">{text(said)}</p>' for said in guards.tripped(metrics["guards"])]
     word = "pass" if good else "fail"
+
     return "\n".join(
         [
             f"<header>\n<h1>{text(scenario.name)}</h1>",
@@ -98,14 +101,17 @@ def _load(run: StoredRun) -> str:
         pair = [key.format(m) if "{}" in key else f"{key}.{m}" for m in "AE"]
         A, E = (shown(each, look_up(run.metrics, each)) for each in pair)
         rows.append((label, A, E))
+
     for key, label in (("load.share_A", "load share"), ("load.thermal_share_A", "thermal share")):
         part = look_up(run.metrics, key)
         rows.append((label, shown(key, part), shown(key, None if part is None else 1.0 - part)))
+
     limit = run.scenario.servo.limit
     if limit is not None:
         peaks = [look_up(run.metrics, f"load.torque_peak.{motor}") or 0.0 for motor in "AE"]
         A, E = (shown("load.share_A", peak / limit) for peak in peaks)
         rows.append((f"peak, of the servo's {shown('load.torque_peak.A', limit)}", A, E))
+
     fraction, energy = (
         shown(key, look_up(run.metrics, key))
         for key in ("load.opposing.fraction", "load.opposing.energy")
@@ -122,7 +128,9 @@ def _phase(run: StoredRun) -> list[str]:
     phase = run.metrics["load"].get("phase")
     if phase is None:
         return []
-    share, rms = phase["share_A"], phase["torque_rms"]
+
+    share = phase["share_A"]
+    rms = phase["torque_rms"]
     rows = [
         (
             f"{100.0 * k / len(share):.4g} to {100.0 * (k + 1) / len(share):.4g} %",
@@ -133,6 +141,7 @@ def _phase(run: StoredRun) -> list[str]:
         for k, part in enumerate(share)
     ]
     head = ("of the cycle", "torque A RMS", "torque E RMS", "load share A")
+
     return [html.table("Over the cycle of the path.", head, rows)]
 
 
@@ -143,11 +152,14 @@ def _metrics(run: StoredRun) -> str:
         if key.startswith("load.phase."):
             continue  # a table of its own
         alike = key.replace("load.stance.", "load.")
-        label, read = key.rpartition(".")[2].replace("_", " "), plain(value)
+        label = key.rpartition(".")[2].replace("_", " ")
+        read = plain(value)
         if alike in SHOWN and (value is None or is_finite(value)):
-            label, read = SHOWN[alike][0], shown(alike, value)
+            label = SHOWN[alike][0]
+            read = shown(alike, value)
         label += ", in stance" if alike != key else ""
         rows.append((label, read, plain(value), html.Cell(f"<code>{text(key)}</code>")))
+
     return html.table(
         "As in metrics.json, there in SI units.", ("metric", "value", "SI", "key"), rows
     )

@@ -45,23 +45,29 @@ def write(leg: FiveBar, out: Path, path: Array | None = None) -> Map:
 
 def _draw(ax: Axes, leg: FiveBar, surveyed: Map, path: Array | None) -> None:
     """Draw a map in mm."""
-    x, z, distance = 1e3 * surveyed.x, 1e3 * surveyed.z, 1e3 * surveyed.distance
+    x = 1e3 * surveyed.x
+    z = 1e3 * surveyed.z
+    distance = 1e3 * surveyed.distance
     inside = np.where(distance >= 0.0, distance, np.nan)
     colours = ax.pcolormesh(x, z, inside, cmap="viridis", shading="nearest", rasterized=True)
     ax.figure.colorbar(colours, ax=ax, label="distance to the boundary [mm]", shrink=0.8)
+
     for curves, colour, label in (
         (workspace.boundary(leg, mode=leg.mode), "black", "boundary: a side chain in line"),
         (workspace.singular_curves(leg), "crimson", "singular: B, C, D in line"),
     ):
         for k, curve in enumerate(curves):
             ax.plot(*(1e3 * curve).T, color=colour, lw=1.3, label=label if k == 0 else None)
+
     rest = kinematics.chain_points(leg, kinematics.home(leg))
     A, E = kinematics.bases(leg)
     for chain in ((A, rest.B, rest.C_left, rest.F), (E, rest.D, rest.C_right)):
         ax.plot(*(1e3 * np.array(chain)).T, "o-", color="white", mec="black", lw=3, ms=5)
         ax.plot(*(1e3 * np.array(chain)).T, "-", color="0.25", lw=1.2)
+
     if path is not None:
         ax.plot(*(1e3 * path).T, color="orange", lw=2, label="foot path")
+
     signs = "".join("+" if s > 0 else "-" for s in leg.mode)
     ax.set(
         aspect="equal",

@@ -39,6 +39,7 @@ def write(runs: Sequence[Path], out: Path | None = None, png: Path | None = None
         raise RunDirectoryError(f"cannot write {place}: a report must end in .html")
     if place.is_dir():
         raise RunDirectoryError(f"cannot write {place}: a directory is there")
+
     read = [stored.read(path) for path in runs]
     files: dict[Path, bytes] = {}
     with look.styled():
@@ -47,6 +48,7 @@ def write(runs: Sequence[Path], out: Path | None = None, png: Path | None = None
         if png is not None:
             files |= {png / f"{one.key}.png": look.png(one.figure) for one in drawn}
         files[place] = page.encode("utf-8", "backslashreplace")
+
     for path, content in files.items():
         whole_file.write(path, content)
     return list(files)

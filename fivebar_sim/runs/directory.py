@@ -41,6 +41,7 @@ def write(result: rrd.Run, path: Path) -> Path:
         stage = Path(tempfile.mkdtemp(prefix=f".{path.name}.", suffix=".partial", dir=path.parent))
     except OSError as error:
         raise RunDirectoryError(f"cannot write {path}: {error.strerror}") from None
+
     try:
         with leftovers.held(stage):
             _fill(stage, result)
@@ -50,6 +51,7 @@ def write(result: rrd.Run, path: Path) -> Path:
         raise RunDirectoryError(f"cannot write {path}: {error.strerror or error}") from None
     finally:
         shutil.rmtree(stage, ignore_errors=True)
+
     leftovers.sweep(path)
     return path
 
@@ -69,6 +71,7 @@ def check_place(path: Path) -> None:
             taken = True  # no system renames the folder it is in
     except OSError as error:
         raise RunDirectoryError(f"cannot write {path}: {error.strerror}") from None
+
     if taken:
         raise RunDirectoryError(f"cannot write {path}: something that is no run directory is there")
     if not there.is_dir() or not os.access(there, os.W_OK | os.X_OK):
@@ -128,6 +131,7 @@ def _renamed(stage: Path, path: Path) -> None:
     if not path.exists():
         stage.rename(path)
         return
+
     aside = Path(tempfile.mkdtemp(prefix=f".{path.name}.", suffix=".old", dir=path.parent))
     old = aside / path.name
     try:

@@ -61,12 +61,14 @@ def _own(run: stored.StoredRun, folder: Path) -> Path:
     own = run.path / RECORDING
     if readable(own):
         return own
+
     try:
         handle, name = tempfile.mkstemp(prefix=f".{RECORDING}.", suffix=".partial", dir=run.path)
     except OSError:  # a directory that one may not write in
         file = folder / RECORDING
         rrd.write(file, [run])
         return file
+
     os.close(handle)
     beside = Path(name)
     try:
@@ -75,6 +77,7 @@ def _own(run: stored.StoredRun, folder: Path) -> Path:
         beside.replace(own)
     finally:
         beside.unlink(missing_ok=True)
+
     return own
 
 

@@ -58,10 +58,12 @@ def read(path: Path) -> StoredRun:
     """
     if not all((path / name).is_file() for name in SOURCES):
         directory.check_run(path)
+
     try:
         scenario = Scenario.load(path / "scenario.toml")
     except FiveBarError as error:
         raise RunDirectoryError(f"{path} is no run that can be read: {error}") from None
+
     record = _record(path / "rollout.parquet")
     for name in _own_columns(scenario):
         if name not in record:
@@ -69,15 +71,18 @@ def read(path: Path) -> StoredRun:
                 f"{path / 'rollout.parquet'} is no record of the scene "
                 f"{scenario.scene.kind!r}: it lacks the column {name}"
             )
+
     rows = len(record["time"])
     if rows != scenario.steps:
         raise RunDirectoryError(
             f"{path / 'rollout.parquet'}: a run of {scenario.duration:g} s at "
             f"{scenario.sim.timestep:g} s has {scenario.steps} rows, got {rows}"
         )
+
     _check_plausible(path / "rollout.parquet", record, scenario.sim.timestep)
     grounded = isinstance(scenario.scene, Ground)
     metrics = stored_metrics.read(path / "metrics.json", grounded=grounded)
+
     return StoredRun(path, scenario, record, metrics)
 
 
@@ -94,6 +99,7 @@ def _check_plausible(file: Path, record: Record, timestep: float) -> None:
         raise RunDirectoryError(
             f"{file}: column time must be {due[k]:g} s in row {k}, got {record['time'][k]:g}"
         )
+
     for name, column in record.items():
         most = next((high for part, high in MOST.items() if name.startswith(part)), LARGEST)
         far = np.abs(column) > most
@@ -128,9 +134,11 @@ def _record(file: Path) -> Record:
             raise RunDirectoryError(f"cannot read {file}: {error.strerror}") from None
         said = " ".join(str(error).split())
         raise RunDirectoryError(f"{file} is no record, or a damaged one: {said}") from None
+
     missing = [name for name in COLUMNS if name not in table.column_names]
     if missing:
         raise RunDirectoryError(f"{file} is no record: it lacks the column {missing[0]}")
+
     record: Record = {}
     for name in table.column_names:
         column = table[name]
@@ -141,4 +149,5 @@ def _record(file: Path) -> Record:
         record[name] = column.to_numpy()
         if not np.isfinite(record[name]).all():
             raise RunDirectoryError(f"{file} is no record: column {name} is not finite")
+
     return record

@@ -216,12 +216,15 @@ def read(file: Path, *, grounded: bool) -> dict[str, Any]:
         raise RunDirectoryError(f"cannot read {file}: {error.strerror or error}") from None
     except (ValueError, RecursionError) as error:
         raise RunDirectoryError(f"{file} is not JSON: {error}") from None
+
     if tables.is_deep(metrics):
         raise RunDirectoryError(f"{file} is not of a run: nested too deep")
+
     try:
         msgspec.convert(metrics, Metrics)
     except msgspec.ValidationError as error:
         raise RunDirectoryError(f"{file}: {_explain(str(error), metrics)}") from None
+
     if grounded != ("ground" in metrics):
         which = "lacks" if grounded else "must not have"
         raise RunDirectoryError(f"{file}: a run of this scene {which} the key ground")
@@ -238,13 +241,16 @@ def _explain(message: str, metrics: Any) -> str:
         if missing[1] == "contains unknown":
             return f"unknown key {dotted}"
         return f"{dotted} is missing: run its scenario.toml again"
+
     came = f"got {_at(metrics, key)!r:.60}"
     name = key or "the file"
     if text.startswith("Invalid enum value"):
         return f"{name} must be 'pass' or 'fail', {came}"
+
     expected = re.fullmatch(r"Expected `([^`]+)`(.*?)(, got .*)?", text)
     if not expected:  # a table's own check
         return f"{name}: {text}"
+
     words = [tables.WORDS.get(word, word) for word in expected[1].split(" | ")]
     return f"{name} must be {' or '.join(words)}{expected[2]}, {came}"
 

@@ -143,7 +143,8 @@ class Csv(FootForce, frozen=True, tag="csv", dict=True):
             ConfigError: What `resolve` would raise, if the file was not read yet.
         """
         del path
-        t, track = times(time, self.end), self._track
+        t = times(time, self.end)
+        track = self._track
         return np.stack([np.interp(t, track.time, F) for F in track.pair.T], axis=-1)
 
     def resolve(self, folder: Path) -> Self:

@@ -44,16 +44,20 @@ def change(table: Table, parts: list[str], value: Any, where: str) -> None:
     top = parts[0]
     if isinstance(table.get(top), str) and top in SHORT and len(parts) > 1:
         table[top] = {SHORT[top]: table[top]}
+
     if top == "limits" and len(parts) > 1:
         if isinstance(table.get("limits"), dict):
             table["limits"] = dict(tables.flat(table["limits"]))
         parts = ["limits", ".".join(parts[1:])]
+
     tables.put(table, parts, value, where)
     if not isinstance(value, str):
         return
+
     if top in KINDS_OF and parts == [top, "kind"] and value in KINDS_OF[top]:
         known = tables.keys(KINDS_OF[top][value])
         table[top] = {k: v for k, v in table[top].items() if k in known}
+
     if parts == ["controller", "name"] and value in control.known():
         known = ["name", *tables.keys(control.find(value))]
         table["controller"] = {k: v for k, v in table["controller"].items() if k in known}
@@ -125,6 +129,7 @@ def _preset(
         return {}, own
     if not isinstance(preset, str) or "\0" in preset:
         raise ConfigError(f"{where}: {name}.preset must be a preset's name, got {preset!r}")
+
     source = folder / preset if preset.endswith(".toml") else preset
     try:
         table = read(source)
@@ -132,6 +137,7 @@ def _preset(
         check(table, str(source))
     except ConfigError as error:
         raise ConfigError(f"{where}: {name}.preset: {error}") from None
+
     return table, own
 
 

@@ -81,8 +81,11 @@ class Scenario(msgspec.Struct, frozen=True, kw_only=True):
 
         Whole periods after the ramp; of a path that comes to rest, until it does.
         """
-        h, ramp, period = self.sim.timestep, self.path.ramp, self.path.period
-        first, last = round(ramp / h), self.steps
+        h = self.sim.timestep
+        ramp = self.path.ramp
+        period = self.path.period
+        first = round(ramp / h)
+        last = self.steps
         if period is not None:
             periods = math.floor((self.duration - ramp) / period * (1.0 + 1e-9))
             return slice(first, min(round((ramp + periods * period) / h), last))
@@ -169,6 +172,7 @@ class Scenario(msgspec.Struct, frozen=True, kw_only=True):
         )
         _check_window(scenario, where)
         _check_scene(scenario, where)
+
         return scenario
 
     def table(self) -> Table:
@@ -180,6 +184,7 @@ class Scenario(msgspec.Struct, frozen=True, kw_only=True):
         for part, name in zip((path, force), self.copies, strict=True):
             if name is not None:
                 part["file"] = name
+
         table = {
             "name": self.name,
             "scene": "air" if self.scene == Air() else _present(msgspec.to_builtins(self.scene)),
@@ -205,7 +210,8 @@ class Scenario(msgspec.Struct, frozen=True, kw_only=True):
     @property
     def copies(self) -> tuple[str | None, str | None]:
         """What the CSV of the path and that of the force are called beside a resolved scenario."""
-        path, force = copied_name(self.path), copied_name(self.force)
+        path = copied_name(self.path)
+        force = copied_name(self.force)
         return path, f"force-{force}" if force is not None and force == path else force
 
     @property
@@ -234,7 +240,9 @@ def _present(table: Table) -> Table:
 
 def _check_window(scenario: Scenario, where: str) -> None:
     """Raise unless the run is long enough to be measured, and the path long enough for the run."""
-    h, path, duration = scenario.sim.timestep, scenario.path, scenario.duration
+    h = scenario.sim.timestep
+    path = scenario.path
+    duration = scenario.duration
     came = f"got {duration:g} s"
     if not 2 <= duration / h <= MOST_STEPS:
         raise ConfigError(
@@ -242,16 +250,22 @@ def _check_window(scenario: Scenario, where: str) -> None:
         )
     if not scenario.steps * h <= path.end * (1.0 + 1e-9):
         raise ConfigError(f"{where}: duration must be at most the path's {path.end:g} s, {came}")
+
     force = scenario.force
     if force is not None and not scenario.steps * h <= force.end * (1.0 + 1e-9):
         raise ConfigError(f"{where}: duration must be at most the force's {force.end:g} s, {came}")
+
     try:
         scenario.servo.latched(1, h)
     except ArgumentError as error:
         raise ConfigError(f"{where}: servo.{error}") from None
-    needs, what = path.ramp, f"the ramp of {path.ramp:g} s"
+
+    needs = path.ramp
+    what = f"the ramp of {path.ramp:g} s"
     if path.period is not None:
-        needs, what = needs + path.period, f"{what} and one period of {path.period:g} s"
+        needs = needs + path.period
+        what = f"{what} and one period of {path.period:g} s"
+
     if not needs <= duration * (1.0 + 1e-9) or scenario.window.stop <= scenario.window.start:
         raise ConfigError(
             f"{where}: duration must be longer than {what}, to have something to measure; {came}"
@@ -279,7 +293,8 @@ def _belted(scene: Scene, path: FootPath, where: str) -> Scene:
 
 def _check_scene(scenario: Scenario, where: str) -> None:
     """Raise unless the scene has what path and limits need."""
-    scene, grounded = scenario.scene, isinstance(scenario.scene, Ground)
+    scene = scenario.scene
+    grounded = isinstance(scenario.scene, Ground)
     kind = scenario.path.__struct_config__.tag
     if scenario.path.needs_ground and not grounded:
         raise ConfigError(
@@ -292,6 +307,7 @@ def _check_scene(scenario: Scenario, where: str) -> None:
         raise ConfigError(
             f"{where}: scene.mass must be in (0, inf) kg where there is no [force], got 0.0"
         )
+
     for key in scenario.limits:
         if key in GROUND_KEYS and not grounded:
             raise ConfigError(

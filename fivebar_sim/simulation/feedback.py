@@ -39,17 +39,21 @@ def steer(plans: Sequence[Plan], nthread: int, watch: Watch | None) -> States:
             simulation that broke down on the way; says which.
     """
     groups = _groups(plans)
-    every, steps, h = groups[0].step.every, plans[0].scenario.steps, plans[0].motion.timestep
+    every = groups[0].step.every
+    steps = plans[0].scenario.steps
+    h = plans[0].motion.timestep
 
     def ask(so_far: States) -> Array | None:
         k = so_far.time.shape[1]
         new = slice(max(k - every, 0), k)
         if is_broken(so_far, new):
             return None
+
         n = min(every, steps - k)
         ctrl = np.empty((len(plans), n, plans[0].model.nu))
         for row, plan in enumerate(plans):
             ctrl[row, :, :-2] = plan.pushes[k : k + n]
+
         for group in groups:
             q, v = (field[group.rows, new][..., MOTORS] for field in (so_far.qpos, so_far.qvel))
             group.step.moved(q, v)
@@ -67,6 +71,7 @@ def steer(plans: Sequence[Plan], nthread: int, watch: Watch | None) -> States:
     states = simulate_asking([plan.model for plan in plans], start, steps, ask, nthread, watch)
     if states.time.shape[1] < steps:  # the others' were ended with it
         _raise_broken(plans, states)
+
     return states
 
 
@@ -95,7 +100,8 @@ def _groups(plans: Sequence[Plan]) -> list[_Group]:
 
 
 def _group(plans: list[Plan], rows: list[int]) -> _Group:
-    plan, s = plans[0], plans[0].scenario
+    plan = plans[0]
+    s = plans[0].scenario
     controller = cast(Feedback, s.controller)
     step = ControlStep(
         s.servo,
@@ -107,6 +113,7 @@ def _group(plans: list[Plan], rows: list[int]) -> _Group:
         start=np.stack([p.motion.q[0, ::2] for p in plans]),
         seeds=[p.scenario.sim.seed for p in plans],
     )
+
     return _Group(rows, plan, controller, step, _references([p.motion for p in plans]))
 
 
@@ -130,23 +137,28 @@ def _command(group: _Group, k: int) -> Array:
         PoseError: It has no answer in a pose, or one that is not finite.
         ConfigError: It fails otherwise, or answers with another shape.
     """
-    s, shape = group.plan.scenario, (len(group.rows), 2)
+    s = group.plan.scenario
+    shape = (len(group.rows), 2)
     arrays = [field[:, k] for field in group.wanted[:-1]]
     wanted = Reference(*arrays, payload=group.wanted.payload)
     name = f"controller {s.controller_name!r}"
+
     try:
         answer = group.controller.command(s.leg, s.servo, group.step.observe(k), wanted)
     except FiveBarError:
         raise
     except Exception as error:  # a user's code may raise anything
         raise ConfigError(f"{name} failed: {type(error).__name__}: {error}") from error
+
     command = np.asarray(answer)
     if command.dtype.kind not in "fiu" or command.shape != shape:
         raise ConfigError(
             f"{name} must command numbers of shape {shape}, got {command.dtype} of shape "
             f"{command.shape}"
         )
+
     bad = ~np.isfinite(command).all(axis=1)
     if bad.any():
         raise PoseError("its command is not finite", (int(np.argmax(bad)),))
+
     return command

@@ -25,6 +25,7 @@ def check(scenario: Scenario, wanted: Motion) -> None:
     limit = scenario.servo.limit
     if limit is None:
         return
+
     torque = _holding(scenario, wanted)
     worst = np.abs(torque).max(axis=1) - scenario.servo.friction
     k = int(np.argmax(worst))
@@ -38,7 +39,9 @@ def check(scenario: Scenario, wanted: Motion) -> None:
 
 def _holding(scenario: Scenario, wanted: Motion) -> Array:
     """Return the torques that hold the poses of a motion [N m], (N + 1, 2)."""
-    leg, theta, scene = scenario.leg, wanted.q[:, ::2], scenario.scene
+    leg = scenario.leg
+    theta = wanted.q[:, ::2]
+    scene = scenario.scene
     rest = np.zeros(2)
     if not isinstance(scene, Ground):
         return dynamics.inverse(leg, theta, rest, rest, wanted.force, payload=wanted.payload)
@@ -57,8 +60,10 @@ def _eased(alone: Array, pull: Array, most: float) -> Array:
         pull: What they change by with each newton of it [N m], (1, 2).
         most: Friction of foot and floor [N].
     """
-    (a, e), (da, de) = alone[0], pull[0]
-    value, slope = np.array([a, e, a - e, a + e]), np.array([da, de, da - de, da + de])
+    a, e = alone[0]
+    da, de = pull[0]
+    value = np.array([a, e, a - e, a + e])
+    slope = np.array([da, de, da - de, da + de])
     most = max(most, 0.0)
     zeros = -value / np.where(slope == 0.0, np.inf, slope)
     forces = np.clip([*zeros, -most, most], -most, most)

@@ -48,7 +48,9 @@ def measure(scenario: Scenario, record: Mapping[str, Array], besides: Unrecorded
         record: The columns of rollout.parquet.
         besides: What its record does not say.
     """
-    leg, start, saturated = scenario.leg, besides.steps.start[-4::2], besides.saturated
+    leg = scenario.leg
+    start = besides.steps.start[-4::2]
+    saturated = besides.saturated
     body = energy.Body(leg, scenario.payload, scenario.trunk)
     balance = energy.balance(body, record, besides.steps)
     branch = _branch(leg, record)
@@ -63,7 +65,8 @@ def measure(scenario: Scenario, record: Mapping[str, Array], besides: Unrecorded
         command=scenario.command,
     )
     window = scenario.window
-    error, gap = tracking_error(record)[window], record["gap"]
+    error = tracking_error(record)[window]
+    gap = record["gap"]
     measured = {
         "tracking": {"rms": _rms(error), "max": float(error.max())},
         "closure": {"rms": _rms(gap), "max": float(gap.max())},
@@ -73,6 +76,7 @@ def measure(scenario: Scenario, record: Mapping[str, Array], besides: Unrecorded
         "guards": [{**guard._asdict(), "ok": guard.ok} for guard in guarded],
         "warnings": int(besides.warnings),
     }
+
     if "ground_z" in record:
         measured["ground"] = ground.measure(leg, record, window)
     return measured
@@ -82,7 +86,9 @@ def _load(
     scenario: Scenario, record: Mapping[str, Array], start: Array, saturated: Bools
 ) -> dict[str, Any]:
     """Return how the motors share the load over the window, and how often they were clipped."""
-    window, path, h = scenario.window, scenario.path, scenario.sim.timestep
+    window = scenario.window
+    path = scenario.path
+    h = scenario.sim.timestep
     torque, theta = (
         np.stack([record[f"{name}_A"], record[f"{name}_E"]], axis=-1)
         for name in ("torque", "theta")
@@ -90,12 +96,15 @@ def _load(
     turned = np.concatenate([start[None], theta])[window.start : window.stop + 1]
     begun = np.maximum(record["time"][window] - h, 0.0)  # when the steps began
     phase = stance = None
+
     if path.period is not None:
         phase = path.cycle(begun)
+
     if "ground_z" in record:
         stance = ground.stands(record)[window]
     elif isinstance(path, Gait):
         stance = path.in_stance(begun)
+
     measured = load.measure(torque[window], turned, h, stance=stance, phase=phase)
     clipped = saturated[window].mean(axis=0).tolist()
     return {**measured, "saturated": dict(zip("AE", clipped, strict=True))}

@@ -55,7 +55,8 @@ def plan(scenario: Scenario) -> Plan:
             period that is no whole number of timesteps, or servos that cannot hold the leg.
         GeometryError: A leg that cannot stand on the scene's ground.
     """
-    sim, scene = scenario.sim, scenario.scene
+    sim = scenario.sim
+    scene = scenario.scene
     wanted = motion.plan(
         scenario.leg,
         scenario.path,
@@ -65,11 +66,15 @@ def plan(scenario: Scenario) -> Plan:
         payload=scenario.payload,
     )
     holding.check(scenario, wanted)
-    start, pushes = wanted.q[0], np.empty((scenario.steps, 0))
+    start = wanted.q[0]
+    pushes = np.empty((scenario.steps, 0))
+
     if isinstance(scene, Ground):
         start = _above_ground(scenario, scene, start)
+
     if isinstance(scene, Payload):
         pushes = wanted.force[:-1]
+
     controller = scenario.controller
     asked = isinstance(controller, Feedback)
     built = model.build(
@@ -82,6 +87,7 @@ def plan(scenario: Scenario) -> Plan:
     )
     setpoints = None if asked else _setpoints(scenario, controller, wanted)
     planned = Plan(scenario, wanted, built, start, pushes, setpoints)
+
     if asked:
         period_steps(planned)
     return planned
@@ -104,7 +110,8 @@ def _above_ground(scenario: Scenario, scene: Ground, q: Array) -> Array:
 
 def _setpoints(scenario: Scenario, controller: Setpoints, wanted: Motion) -> Array:
     """Return the setpoints that the scenario's controller plans, checked, as they arrive."""
-    name, shape = f"controller {scenario.controller_name!r}", (scenario.steps, 2)
+    name = f"controller {scenario.controller_name!r}"
+    shape = (scenario.steps, 2)
     try:
         planned = controller.setpoints(
             scenario.leg, scenario.servo, wanted, scenario.sim.integrator
@@ -113,12 +120,14 @@ def _setpoints(scenario: Scenario, controller: Setpoints, wanted: Motion) -> Arr
         raise
     except Exception as error:  # a user's code may raise anything
         raise ConfigError(f"{name} failed: {type(error).__name__}: {error}") from error
+
     ctrl = np.asarray(planned)
     if ctrl.dtype.kind not in "fiu" or ctrl.shape != shape or not np.isfinite(ctrl).all():
         raise ConfigError(
             f"{name} must plan finite setpoints [rad] of shape {shape}, "
             f"got {ctrl.dtype} of shape {ctrl.shape}"
         )
+
     return scenario.servo.sent(ctrl.astype(np.float64), wanted.q[0, ::2], scenario.sim.timestep)
 
 

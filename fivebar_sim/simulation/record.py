@@ -32,11 +32,13 @@ def columns(planned: Plan, states: States, begin: int = 0) -> Record:
         begin: The step that the first of them is; after 0, the torque of that one is not known,
             and is the one of a step from where the leg should have been, at rest.
     """
-    leg, wanted = planned.scenario.leg, planned.motion
+    leg = planned.scenario.leg
+    wanted = planned.motion
     q, v, ctrl = _joints(states)
     points = kinematics.chain_points(leg, q)
     rows = slice(begin + 1, begin + len(q) + 1)
-    target, gap = wanted.foot[rows], points.C_right - points.C_left
+    target = wanted.foot[rows]
+    gap = points.C_right - points.C_left
     torque = _torque(planned, states, begin)
     record = {
         "time": wanted.time[rows],
@@ -51,6 +53,7 @@ def columns(planned: Plan, states: States, begin: int = 0) -> Record:
     record |= {"torque_A": torque[:, 0], "torque_E": torque[:, 1]}
     record["gap"] = np.hypot(gap[:, 0], gap[:, 1])
     record |= _surroundings(planned, states, begin)
+
     return {name: np.ascontiguousarray(column) for name, column in record.items()}
 
 
@@ -72,7 +75,8 @@ def _drive(planned: Plan) -> Drive:
 
 def _torque(planned: Plan, states: States, begin: int) -> Array:
     """Return the torque that each motor gave in each step [N m], (N, 2)."""
-    scenario, (q_next, v_next, ctrl) = planned.scenario, _joints(states)
+    scenario = planned.scenario
+    q_next, v_next, ctrl = _joints(states)
     return applied_torque(
         scenario.servo,
         scenario.sim.integrator,
@@ -86,7 +90,8 @@ def _torque(planned: Plan, states: States, begin: int) -> Array:
 
 def unrecorded(planned: Plan, states: States) -> Unrecorded:
     """Return what a run did besides its record."""
-    pushes, limit = states.ctrl[0, :, :-2], planned.model.opt.iterations
+    pushes = states.ctrl[0, :, :-2]
+    limit = planned.model.opt.iterations
     return Unrecorded(
         steps=energy.Steps(planned.start, states.constraint[0], pushes),
         saturated=saturated(planned, states),
@@ -103,7 +108,8 @@ def saturated(planned: Plan, states: States) -> Bools:
 
 def _surroundings(planned: Plan, states: States, begin: int) -> Record:
     """Return the columns of what the leg hangs on and stands on."""
-    scene, steps = planned.scenario.scene, states.time.shape[1]
+    scene = planned.scenario.scene
+    steps = states.time.shape[1]
     record: Record = {}
     if isinstance(scene, Ground):
         record |= {"hip_z": states.qpos[0, :, 0], "hip_dot_z": states.qvel[0, :, 0]}

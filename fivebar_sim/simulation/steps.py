@@ -113,18 +113,23 @@ class Legs:
         Raises:
             ArgumentError: Commands of another shape, or that are not finite.
         """
-        (nq, nv, nu), nsim = self._sizes, self._batch.nsim
+        nq, nv, nu = self._sizes
+        nsim = self._batch.nsim
         if ctrl.ndim != 3 or ctrl.shape[::2] != (nsim, nu):
             raise ArgumentError(f"ctrl must have shape ({nsim}, N, {nu}), got {ctrl.shape}")
         if not np.isfinite(ctrl).all():
             raise ArgumentError("ctrl must be finite: MuJoCo would reset the leg and go on")
+
         record = (STATE, *STEP) if self._ground is None else (STATE, *STEP, "sensordata")
         with quiet():
             out = self._batch.rollout(ctrl.shape[1], ctrl, record=record)
-        state, start = out[STATE], self._ground
+
+        state = out[STATE]
+        start = self._ground
         ground = state[..., :0]
         if start is not None:
             ground = out["sensordata"][..., [start, start + 2]]
+
         return States(
             time=state[..., 0],
             qpos=state[..., 1 : 1 + nq],
@@ -138,7 +143,8 @@ class Legs:
 
     def nothing(self, steps: int) -> States:
         """Return room for the states of some steps, to be filled."""
-        (nq, nv, nu), nsim = self._sizes, self._batch.nsim
+        nq, nv, nu = self._sizes
+        nsim = self._batch.nsim
         sizes = (nq, nv, nu, 0 if self._ground is None else 2, nv)
         fields = (np.empty((nsim, steps, size)) for size in sizes)
         iterations: Any = np.empty((nsim, steps), dtype=np.int32)
@@ -165,7 +171,8 @@ def simulate(
     Raises:
         ArgumentError: Shapes that do not fit, or commands that are not finite.
     """
-    legs, parts = Legs(models, qpos, nthread), []
+    legs = Legs(models, qpos, nthread)
+    parts = []
     if ctrl.ndim != 3:
         legs.advance(ctrl)
     for part in _chunks(ctrl, CHUNK // max(len(ctrl), 1) if watch is None else WATCHED):
@@ -205,7 +212,11 @@ def simulate_asking(
         ArgumentError: Shapes that do not fit, or commands that are not finite.
     """
     legs = Legs(models, qpos, nthread)
-    states, k, shown, last = legs.nothing(steps), 0, 0, time.monotonic()
+    states = legs.nothing(steps)
+    k = 0
+    shown = 0
+    last = time.monotonic()
+
     while k < steps:
         ctrl = ask(states.part(slice(k)))
         if ctrl is None:
@@ -214,10 +225,12 @@ def simulate_asking(
         n = part.time.shape[1]
         for whole, piece in zip(states[:-1], part[:-1], strict=True):
             whole[:, k : k + n] = piece
-        states, k = states._replace(warnings=part.warnings), k + n
+        states = states._replace(warnings=part.warnings)
+        k = k + n
         if watch is not None and (time.monotonic() - last >= GLANCE or k == steps):
             watch(states.part(slice(shown, k)))
-            shown, last = k, time.monotonic()
+            shown = k
+            last = time.monotonic()
     return states.part(slice(k))
 
 
@@ -242,6 +255,7 @@ def check(states: States, timestep: float) -> None:
             f"{timestep:g} s or softer gains",
             (k + 1) * timestep,
         )
+
     if states.warnings.any():
         raise DivergedError(
             f"MuJoCo gave {int(states.warnings.sum())} warnings in the last step",

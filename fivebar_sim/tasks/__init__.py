@@ -54,14 +54,17 @@ def task(kind: str | Task, **options: Any) -> Task:
     """
     if not isinstance(kind, Task) and kind not in KINDS:
         raise ArgumentError(unknown("task", str(kind), KINDS))
+
     known = KINDS[kind] if isinstance(kind, str) else type(kind)
     for name in options:
         if name not in known.__struct_fields__:
             what = f"option of task {known.__struct_config__.tag!r}"
             raise ArgumentError(unknown(what, name, known.__struct_fields__))
+
     for name, preset in (("leg", FiveBar), ("servo", Servo)):
         if name in options and not isinstance(options[name], preset):
             options[name] = preset.load(options[name])
+
     if isinstance(kind, Task):
         return msgspec.structs.replace(kind, **options)
     return KINDS[kind](**options)

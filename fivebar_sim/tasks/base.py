@@ -94,6 +94,7 @@ class Task(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
             raise ArgumentError("action 'torque' needs a servo with a limit: its bounds [N m]")
         if self.integrator not in get_args(Integrator):
             raise ArgumentError(unknown("integrator", str(self.integrator), get_args(Integrator)))
+
         check_number("span", self.span, "rad", low=0.0, high=WIDEST, strict=True)
         check_number("spread", self.spread, "m", low=0.0, high=self.leg.size)
         check_number("timestep", self.timestep, "s", low=0.0, strict=True)
@@ -105,6 +106,7 @@ class Task(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
                 f"duration must be a whole number of periods of {self.period:g} s, "
                 f"got {self.duration!r} s"
             )
+
         for name, weight in self.weights.items():
             if name not in self.WEIGHTS:
                 raise ArgumentError(unknown("reward term", name, self.WEIGHTS))
@@ -169,7 +171,8 @@ class Task(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
             assert self.servo.limit is not None
             return np.full(2, -self.servo.limit), np.full(2, self.servo.limit)
         rest = kinematics.home(self.leg)[::2]
-        low, high = rest - self.span, rest + self.span
+        low = rest - self.span
+        high = rest + self.span
         if self.action == "position":
             return low, high
         fastest = np.full(2, self.servo.speed or FASTEST)
@@ -190,6 +193,7 @@ class Task(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
                 "hip_dot_z": Part(1, "m/s"),
                 "contact": Part(1, ""),
             }
+
         return {**parts, **self.TARGETS}
 
     def targets(self) -> dict[str, Array]:

@@ -62,7 +62,8 @@ class Episodes:
     """
 
     def __init__(self, task: Task, drawn: Sequence[Task], starts: Array) -> None:
-        self.task, self.size = task, len(drawn)
+        self.task = task
+        self.size = len(drawn)
         self.low, self.high = task.bounds
         self._leg = stacked([each.leg for each in drawn], 1)
         servos = [each.servo for each in drawn]
@@ -71,7 +72,8 @@ class Episodes:
         self._starts = starts
         self._targets = np.concatenate(list(task.targets().values()), axis=1)
         self._weights = {name: task.weight(name) for name in task.WEIGHTS}
-        self.qpos, self.qvel = starts[:, 0].copy(), np.zeros_like(starts[:, 0])
+        self.qpos = starts[:, 0].copy()
+        self.qvel = np.zeros_like(starts[:, 0])
         self._count = np.zeros(self.size, dtype=np.int64)
         self._fresh = np.ones(self.size, dtype=bool)
         self._broken = np.zeros(self.size, dtype=bool)
@@ -98,8 +100,11 @@ class Episodes:
         which = [int(generator.integers(self._starts.shape[1])) for generator in random]
         seeds = [int(generator.integers(2**63)) for generator in random]
         qpos = self._starts[rows, which]
-        self.qpos[rows], self.qvel[rows] = qpos, 0.0
-        self._count[rows], self._fresh[rows], self._broken[rows] = 0, True, False
+        self.qpos[rows] = qpos
+        self.qvel[rows] = 0.0
+        self._count[rows] = 0
+        self._fresh[rows] = True
+        self._broken[rows] = False
         self._torque[rows] = 0.0
         self._control.restart(rows, qpos[:, MOTORS], seeds)
         return qpos
@@ -113,15 +118,18 @@ class Episodes:
         values = as_vectors(np.asarray(action), "action", len(self.low))
         if values.shape != shape:
             raise ArgumentError(f"action must have shape {shape}, got {values.shape}")
+
         outside = ~((values >= self.low) & (values <= self.high))
         if outside.any():
             index = tuple(int(i) for i in np.argwhere(outside)[0])
             name, unit, number = part_at(self.task.actions, index[-1])
-            low, high = self.low[index[-1]], self.high[index[-1]]
+            low = self.low[index[-1]]
+            high = self.high[index[-1]]
             raise ArgumentError(
                 f"action {name}[{number}] must be in [{low:.6g}, {high:.6g}] {unit}, "
                 f"got {float(values[index])!r} at index {index}"
             )
+
         return values
 
     def commands(self, action: Array) -> Array:
@@ -150,12 +158,16 @@ class Episodes:
         """
         sound = np.abs(qvel).max(axis=(1, 2)) < SPEED_LIMIT  # NaN is not
         self._broken = ~(sound & np.isfinite(qpos).all(axis=(1, 2)) & (warnings == 0))
-        q, v = qpos[..., MOTORS], qvel[..., MOTORS]
+        q = qpos[..., MOTORS]
+        v = qvel[..., MOTORS]
+
         if self._broken.any():
             bad = self._broken[:, None, None]
             qpos = np.where(bad, self.qpos[:, None], qpos)
             qvel = np.where(bad, self.qvel[:, None], qvel)
-            q, v = qpos[..., MOTORS], qvel[..., MOTORS]
+            q = qpos[..., MOTORS]
+            v = qvel[..., MOTORS]
+
         before = (
             np.concatenate([self.qpos[:, None, MOTORS], q[:, :-1]], axis=1),
             np.concatenate([self.qvel[:, None, MOTORS], v[:, :-1]], axis=1),
@@ -165,7 +177,8 @@ class Episodes:
             self._servo, task.integrator, self._ctrl, *before, q, v, task.drive
         )
         self._control.moved(q, v)
-        self.qpos, self.qvel = qpos[:, -1].copy(), qvel[:, -1].copy()
+        self.qpos = qpos[:, -1].copy()
+        self.qvel = qvel[:, -1].copy()
         self._count += 1
         self._fresh[:] = False
 
@@ -178,13 +191,16 @@ class Episodes:
         ran = ~self._fresh
         terms = {name: term * ran for name, term in task.terms(now, targets).items()}
         reward = np.zeros(self.size)
+
         for name, term in terms.items():
             reward += self._weights[name] * term
+
         reason = now.reason * ran
         terminated = reason > 0
         truncated = ~terminated & (self._count >= task.periods)
         reason[truncated] = TIME
         observation = task.observation(seen, now, targets)
+
         return Outcome(observation, reward, terms, terminated, truncated, reason)
 
 

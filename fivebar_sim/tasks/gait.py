@@ -38,7 +38,8 @@ class Gait(Grounded, frozen=True, tag="gait"):
     @property
     def scene(self) -> Scene:
         """The treadmill."""
-        path, leg = self.foot_path, self.leg
+        path = self.foot_path
+        leg = self.leg
         return Treadmill(
             mass=self.mass,
             friction=self.friction,
@@ -53,7 +54,9 @@ class Gait(Grounded, frozen=True, tag="gait"):
         if self.path is not None:
             assert isinstance(self.path, paths.Gait)
             return self.path
-        (x, z), size = self.home.tolist(), self.leg.size
+
+        x, z = self.home.tolist()
+        size = self.leg.size
         return paths.Gait(
             centre=(x, z - 0.08 * size),
             stride=0.4 * size,

@@ -141,14 +141,18 @@ def starts(task: Task) -> Array:
     steps = task.periods * task.every
     wanted = motion.plan(task.leg, task.foot_path, steps, task.timestep)
     i = np.arange(STARTS)
-    angle, away = i * (3.0 - np.sqrt(5.0)) * np.pi, task.spread * np.sqrt(i / STARTS)
+    angle = i * (3.0 - np.sqrt(5.0)) * np.pi
+    away = task.spread * np.sqrt(i / STARTS)
     feet = wanted.foot[0] + away[:, None] * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
     q = np.tile(wanted.q[0], (STARTS, 1))
+
     if task.spread > 0.0:
         for row, (x, z) in enumerate(feet[1:].tolist(), start=1):
             hold = Step(start=(x, z), stop=(x, z), lift=0.0, seconds=1.0)
             q[row] = motion.plan(task.leg, hold, 1, task.timestep).q[0]
+
     if not isinstance(task.scene, Ground):
         return q
+
     height = [model.standing(task.leg, pose) + task.scene.drop for pose in q]
     return np.concatenate([np.array(height)[:, None], q], axis=1)

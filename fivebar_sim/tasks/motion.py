@@ -70,14 +70,17 @@ def motion(leg: FiveBar, qpos: Array, qvel: Array, torque: Array, broken: Bools)
         torque: What the motors gave in each step of the period [N m], (n, every, 2).
         broken: Whether the physics broke down, (n,).
     """
-    q, q_dot = qpos[:, -4:], qvel[:, -4:]
+    q = qpos[:, -4:]
+    q_dot = qvel[:, -4:]
     p = kinematics.chain_points(leg, q)
     A, _ = kinematics.bases(leg)
     foot_dot = perp(p.B - A) * q_dot[:, :1] + perp(p.F - p.B) * (q_dot[:, :1] + q_dot[:, 1:2])
     hip = np.concatenate([qpos[:, :-4], qvel[:, :-4]], axis=1)
     height = np.full(len(q), np.inf)
+
     if hip.shape[1]:
         height = hip[:, 0] + p.F[:, 1] - leg.foot_radius
+
     reason = _reason(leg, q, p)
     reason[broken] = 1
     return Motion(q, q_dot, p.F, foot_dot, hip, height, torque, reason)

@@ -44,7 +44,9 @@ class Randomise(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only
             if not (isinstance(pair, (tuple, list)) and len(pair) == 2):
                 raise ArgumentError(f"{name} must be two numbers (low, high), got {pair!r}")
             late = name == "delay"
-            low, high, unit = 0.0 if late else 0.1, 1.0 if late else 10.0, "s" if late else ""
+            low = 0.0 if late else 0.1
+            high = 1.0 if late else 10.0
+            unit = "s" if late else ""
             check_number(f"{name}[0]", pair[0], unit, low=low, high=high)
             check_number(f"{name}[1]", pair[1], unit, low=float(pair[0]), high=high)
 
@@ -60,7 +62,9 @@ class Randomise(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only
             name: random.uniform(*getattr(self, name), size=4 if name == "length" else 1).tolist()
             for name in self.__struct_fields__
         }
-        (kp,), (kd,), (delay,) = factor["kp"], factor["kd"], factor["delay"]
+        (kp,) = factor["kp"]
+        (kd,) = factor["kd"]
+        (delay,) = factor["delay"]
         servo = msgspec.structs.replace(
             task.servo,
             kp=task.servo.kp * kp,
@@ -68,11 +72,13 @@ class Randomise(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only
             delay=task.servo.delay + delay,
         )
         ground = {}
+
         if isinstance(task, Grounded):
             ground = {
                 "mass": task.mass * factor["trunk"][0],
                 "friction": task.friction * factor["friction"][0],
             }
+
         leg = _leg(task.leg, factor["length"], factor["mass"][0])
         return msgspec.structs.replace(task.resolved(), leg=leg, servo=servo, **ground)
 

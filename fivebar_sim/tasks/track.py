@@ -37,7 +37,8 @@ class Track(Task, frozen=True, tag="track"):
         """The path, or the ellipse."""
         if self.path is not None:
             return self.path
-        (x, z), size = self.home.tolist(), self.leg.size
+        x, z = self.home.tolist()
+        size = self.leg.size
         return Ellipse(centre=(x, z), radii=(0.2 * size, 0.08 * size), frequency=2.0)
 
     def targets(self) -> dict[str, Array]:

@@ -130,20 +130,24 @@ def spans(radius: float, base: float, low: float, high: float) -> list[tuple[flo
     Returns:
         (start, stop) [rad], at most two, the one below the axis first; (-pi, pi) is a whole turn.
     """
-    near, far = abs(radius - base), radius + base
+    near = abs(radius - base)
+    far = radius + base
     slack = EXACT * far
     if not (low <= far + slack and high >= near - slack):
         return []
     if near == far:
         return [(-np.pi, np.pi)]
+
     r = np.array([low, high])
-    sine2, cosine2 = (r - near) * (r + near), (far - r) * (far + r)
+    sine2 = (r - near) * (r + near)
+    cosine2 = (far - r) * (far + r)
     halves = np.arctan2(np.sqrt(np.maximum(sine2, 0.0)), np.sqrt(np.maximum(cosine2, 0.0)))
     first, last = (2.0 * halves).tolist()
     if first == 0.0:
         return [(-last, last)]
     if last == np.pi:
         return [(first, 2.0 * np.pi - first)]
+
     return [(-last, -first), (first, last)]
 
 
@@ -158,9 +162,11 @@ def trace(bar: FourBar) -> list[Array]:
     reach = (abs(bar.coupler - rocker), bar.coupler + rocker)
     tiny = EXACT * bar.scale
     whole = np.linspace(0.0, 2.0 * np.pi, round(2.0 * np.pi / STEP) + 2)
+
     if bar.coupler <= tiny:  # B and C are one pin, about which the foot turns
         ends = {x for x, y in spans(bar.crank, bar.base, *reach) if y - x < 2.0 * np.pi}
         return [np.stack([np.full_like(whole, x), whole], axis=-1) for x in sorted(ends)]
+
     curves: list[Array] = []
     for start, stop in spans(bar.crank, bar.base, *reach):
         if stop - start == 2.0 * np.pi:
@@ -168,6 +174,7 @@ def trace(bar: FourBar) -> list[Array]:
         else:
             poses = [partial(_swinging, bar, 0.5 * (start + stop), 0.5 * (stop - start))]
         curves += [piece for pose in poses for piece in _sampled(bar, pose)]
+
     if abs(bar.crank - bar.base) <= tiny and abs(bar.coupler - rocker) <= tiny:
         curves.append(np.stack([np.zeros_like(whole), whole], axis=-1))
     return curves
@@ -185,16 +192,21 @@ def cut(bar: FourBar, q: Array, f: Callable[[Array], Array]) -> Array:
     sign = np.sign(value[:-1])
     near = (sign == np.sign(value[1:])) & (np.minimum(*np.abs([value[:-1], value[1:]])) <= around)
     rows = np.flatnonzero(near)
+
     if rows.size:
-        start, dq = q[rows], q[rows + 1] - q[rows]
+        start = q[rows]
+        dq = q[rows + 1] - q[rows]
         s = _lowest(lambda s: sign[rows] * f(bar.between(start, dq, s)), len(rows))
         found = bar.between(start, dq, s)
         keep = sign[rows] * f(found) < 0.0
         q = np.insert(q, rows[keep] + 1, found[keep], axis=0)
         value = f(q)
+
     rows = np.flatnonzero(value[:-1] * value[1:] < 0.0)
-    start, dq = q[rows], q[rows + 1] - q[rows]
+    start = q[rows]
+    dq = q[rows + 1] - q[rows]
     s = crossing(lambda s: f(bar.between(start, dq, s)), value[rows], value[rows + 1])
+
     return np.insert(q, rows + 1, bar.between(start, dq, s), axis=0)
 
 
@@ -206,14 +218,20 @@ def crossing(f: Callable[[Array], Array], f_0: Array, f_1: Array) -> Array:
         f_0: Values at 0.
         f_1: Values at 1.
     """
-    a, b, f_a, f_b = np.zeros(len(f_0)), np.ones(len(f_0)), f_0, f_1
+    a = np.zeros(len(f_0))
+    b = np.ones(len(f_0))
+    f_a = f_0
+    f_b = f_1
+
     for _ in range(SPLITS):
         new = b - f_b * (b - a) / np.where(f_b == f_a, 1.0, f_b - f_a)
         f_new = f(new)
         flips = f_new * f_b < 0.0
-        a, f_a = np.where(flips, b, a), np.where(flips, f_b, 0.5 * f_a)
+        a = np.where(flips, b, a)
+        f_a = np.where(flips, f_b, 0.5 * f_a)
         moved = np.abs(new - b)
-        b, f_b = new, f_new
+        b = new
+        f_b = f_new
         if not (moved > 1e-15).any():
             break
     return b
@@ -244,7 +262,8 @@ def _on_side(bar: FourBar, theta: Array, side: Array) -> Array:
     B = bar.crank * np.exp(1j * theta)
     r = bar.base - B
     d2 = np.abs(r) ** 2
-    K, R = bar.coupler, bar.rocker
+    K = bar.coupler
+    R = bar.rocker
     along = d2 + (K - R) * (K + R)
     across = np.sqrt(np.maximum(((K + R) ** 2 - d2) * (d2 - (K - R) ** 2), 0.0))
     k = np.unwrap(np.angle(r * (along + 1j * side * across) * np.exp(-1j * theta)))
@@ -271,8 +290,10 @@ def _sampled(bar: FourBar, pose: Callable[[Array], Array]) -> list[Array]:
 def _coarse(bar: FourBar, q: Array) -> Bools:
     """Return which neighbours are too far apart: in angle, in place, in F's direction, in C'."""
     dq = np.diff(q, axis=0)
-    F, other = bar.joints(q)[2], bar.other_elbow(q)
-    before, after = bar.velocity(q[:-1], dq), bar.velocity(q[1:], dq)
+    F = bar.joints(q)[2]
+    other = bar.other_elbow(q)
+    before = bar.velocity(q[:-1], dq)
+    after = bar.velocity(q[1:], dq)
     turn = np.abs(np.angle(after * np.conj(before)))
     far = np.maximum(np.abs(np.diff(F)), np.abs(np.diff(other))) > STEP * bar.scale
     angle = np.abs(dq).max(axis=-1)
@@ -282,11 +303,14 @@ def _coarse(bar: FourBar, q: Array) -> Bools:
 def _lowest(f: Callable[[Array], Array], count: int) -> Array:
     """Return where in [0, 1] functions 1 to n with one minimum each are least: golden section."""
     golden = 0.5 * (5.0**0.5 - 1.0)
-    a, b = np.zeros(count), np.ones(count)
+    a = np.zeros(count)
+    b = np.ones(count)
     for _ in range(40):  # to 4e-9: the value to rounding
-        c, d = b - golden * (b - a), a + golden * (b - a)
+        c = b - golden * (b - a)
+        d = a + golden * (b - a)
         left = f(c) < f(d)
-        a, b = np.where(left, a, c), np.where(left, d, b)
+        a = np.where(left, a, c)
+        b = np.where(left, d, b)
     return 0.5 * (a + b)
 
 

@@ -51,6 +51,7 @@ def gathered(pieces: list[tuple[FourBar, Array]]) -> Curves:
     F = np.concatenate([none, *(bar.joints(q)[2] for bar, q in pieces)])
     leave = np.concatenate([none, *(bar.velocity(q[:-1], np.diff(q, axis=0)) for bar, q in pieces)])
     arrive = np.concatenate([none, *(bar.velocity(q[1:], np.diff(q, axis=0)) for bar, q in pieces)])
+
     return Curves(F, first, q, dq, rocker, leave, arrive, ends)
 
 
@@ -81,8 +82,11 @@ def nearest_on(curves: Curves, bar: FourBar, p: Complex) -> tuple[Rows, Complex,
     from_start = _along(p[owner] - k.F[k.first[segment]], k.leave[segment])
     from_end = _along(p[owner] - k.F[k.first[segment] + 1], k.arrive[segment])
     turns = (from_start > 0.0) & (from_end < 0.0)
-    owner, segment = owner[turns], segment[turns]
-    q, dq, at = k.q[segment], k.dq[segment], p[owner]
+    owner = owner[turns]
+    segment = segment[turns]
+    q = k.q[segment]
+    dq = k.dq[segment]
+    at = p[owner]
     bar = bar._replace(rocker=k.rocker[segment])
 
     def slope(s: Array) -> Array:

@@ -114,7 +114,8 @@ class Extended(NamedTuple):
         """
         p = from_hip(self.leg, points)
         owner, c, b = _candidates(self, p)
-        base, far = b[owner], p[owner]
+        base = b[owner]
+        far = p[owner]
         total = np.abs(far - base) + np.abs(far - c)
         gain = (np.conj(c - base) * (2.0 * far - base - c)).real
         gain /= np.where(total > 0.0, total, 1.0)
@@ -122,9 +123,11 @@ class Extended(NamedTuple):
         np.maximum.at(most, owner, gain)
         if np.isinf(most).any():
             raise self.empty()
+
         best = np.flatnonzero(gain >= most[owner] - ROUNDING * self.scale)[::-1]
         nearest = np.empty_like(p)
         nearest[owner[best]] = c[best]  # of equal owners the last is kept, in order the first
+
         return to_hip(self.leg, nearest)
 
     def boundary(self, step: float) -> list[Array]:
@@ -166,7 +169,8 @@ def to_hip(leg: FiveBar, z: Complex) -> Array:
 
 def _reach(leg: FiveBar) -> tuple[float, float]:
     """Return the radii of E's reach [m]; a hole that `reaches` takes for rounding is none."""
-    inner, outer = abs(leg.L4 - leg.L3), leg.L4 + leg.L3
+    inner = abs(leg.L4 - leg.L3)
+    outer = leg.L4 + leg.L3
     return (inner if inner**2 > ROUNDING * outer**2 else 0.0), outer
 
 
@@ -187,6 +191,7 @@ def region(leg: FiveBar, elbow: int) -> Extended:
             f"L6: the foot is on B; its distance from there must be above {SHORTEST * leg.size:g} "
             f"m, got {rho:g} m"
         )
+
     low, high = _reach(leg)
     offset = complex(*leg.foot_offset)
     bar = FourBar(leg.L1, leg.L2, high, leg.L5, offset)
@@ -195,6 +200,7 @@ def region(leg: FiveBar, elbow: int) -> Extended:
     inner = Circle(abs(leg.L1 - rho), inward * (leg.L1 - leg.L2 * rho / offset))
     holed = inner.radius**2 > ROUNDING * outer.radius**2
     curves = _curves(leg, elbow, bar, low, high)
+
     return Extended(leg, elbow, bar, (inner, outer) if holed else (outer,), curves)
 
 
@@ -225,6 +231,7 @@ def _curves(leg: FiveBar, elbow: int, bar: FourBar, low: float, high: float) -> 
             middle = one.between(q[:-1], dq, np.full(len(dq), 0.5))
             outside = np.any([test(middle) >= 0.0 for test in tests], axis=0)
             pieces += [(one, piece) for piece in runs(q, outside)]
+
     return gathered(pieces)
 
 
@@ -235,7 +242,8 @@ def _rockers(leg: FiveBar, low: float, high: float) -> list[float]:
     poses on it, but none beyond it.
     """
     slack = ROUNDING * leg.size
-    c_low, c_high = abs(leg.L1 - leg.L2), leg.L1 + leg.L2
+    c_low = abs(leg.L1 - leg.L2)
+    c_high = leg.L1 + leg.L2
     rockers = []
     if low > max(c_low - leg.L5, leg.L5 - c_high, 0.0) + slack:
         rockers.append(low)
@@ -253,18 +261,22 @@ def _candidates(region: Extended, p: Complex) -> tuple[Rows, Complex, Complex]:
         b: For each p any candidate, or 0 if none is known, (n,).
     """
     every = np.arange(len(p))
-    owner, c = [], []
+    owner = []
+    c = []
     length = np.abs(p)
     off = length > ROUNDING * region.scale
     ray = np.where(off, p, -1.0) / np.where(off, length, 1.0)
+
     for circle in region.circles:
         r = circle.C * ray - region.leg.L5
         ok = reaches(r.real**2 + r.imag**2, region.leg.L4, region.leg.L3)
         owner.append(every[ok])
         c.append(circle.radius * ray[ok])
+
     b = np.zeros_like(p)
     if len(region.curves.F):
         on_curve, F, b = nearest_on(region.curves, region.bar, p)
         owner += [on_curve, every]
         c += [F, b]
+
     return np.concatenate(owner), np.concatenate(c), b

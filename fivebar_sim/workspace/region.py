@@ -88,10 +88,12 @@ def nearest(
         raise ArgumentError(
             f"margin must be 0 m for the nearest point of a leg with L6 > 0, got {margin:g} m"
         )
+
     whole = _region(leg, margin, mode)
 
     def solve(p: Array) -> Array:
-        best, lost = p.copy(), ~whole.holds(p)
+        best = p.copy()
+        lost = ~whole.holds(p)
         if lost.any():
             best[lost] = _settled(whole, whole.boundary_point(p[lost]))
         return best
@@ -219,6 +221,7 @@ def _settled(whole: Rings | Extended, points: Array) -> Array:
         ok = whole.holds(moved)
         points[lost[ok]] = moved[ok]
         lost = lost[~ok]
+
     if lost.size:
         raise whole.empty()
     return points

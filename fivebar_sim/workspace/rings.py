@@ -55,7 +55,8 @@ class Ring(NamedTuple):
     @property
     def radii(self) -> tuple[float, ...]:
         """Radii of the circles [m], inner first; a hole that `holds` takes for rounding is none."""
-        inner, outer = abs(self.near - self.far), self.near + self.far
+        inner = abs(self.near - self.far)
+        outer = self.near + self.far
         return (inner, outer) if inner**2 > ROUNDING * outer**2 else (outer,)
 
     @property
@@ -73,7 +74,8 @@ class Ring(NamedTuple):
 
         The sum of the links is less by the margin, and their difference more, unless it is none.
         """
-        long, short = max(self.near, self.far), min(self.near, self.far)
+        long = max(self.near, self.far)
+        short = min(self.near, self.far)
         if self.hole == 0.0:
             return self._replace(near=long - 0.5 * margin, far=short - 0.5 * margin)
         return self._replace(near=long, far=short - margin)
@@ -134,8 +136,12 @@ class Rings(NamedTuple):
         """
         if self._void:
             raise self.empty()
+
         rounding = ROUNDING * self.scale
-        best, d_best, found = np.zeros_like(p), np.zeros(len(p)), np.zeros(len(p), dtype=bool)
+        best = np.zeros_like(p)
+        d_best = np.zeros(len(p))
+        found = np.zeros(len(p), dtype=bool)
+
         for c, on_boundary in self._candidates(p):
             d = _norm(p - c)
             nearer = dot(c - best, (p - best) + (p - c)) > rounding * (d + d_best)
@@ -143,6 +149,7 @@ class Rings(NamedTuple):
             best[take] = c[take] if c.ndim == 2 else c
             d_best[take] = d[take]
             found |= take
+
         if not found.all():
             raise self.empty()
         return best
@@ -189,9 +196,11 @@ def rings(leg: FiveBar, margin: float = 0.0) -> Rings:
     along = unit(leg.tilt)
     down = np.array([0.0, -1.0])
     away_A, away_E = (-along, along) if leg.L5 > 0.0 else (down, down)
-    left, right = Ring(A, leg.L1, leg.L2, away_A), Ring(E, leg.L4, leg.L3, away_E)
+    left = Ring(A, leg.L1, leg.L2, away_A)
+    right = Ring(E, leg.L4, leg.L3, away_E)
     if margin > 0.0:
-        left, right = left.shrunk(margin), right.shrunk(margin)
+        left = left.shrunk(margin)
+        right = right.shrunk(margin)
     return Rings(leg, left, right, margin)
 
 
@@ -210,7 +219,8 @@ def _corners(left: Ring, right: Ring) -> Iterator[Array]:
     d = float(_norm(AE))
     for r_A in left.radii:
         for r_E in right.radii:
-            t, g = r_A + r_E, r_A - r_E
+            t = r_A + r_E
+            g = r_A - r_E
             rounding = ROUNDING * (t + d)
             if not (d > 0.0 and abs(g) - rounding <= d <= t + rounding):
                 continue

@@ -44,4 +44,5 @@ def _pieces(leg: FiveBar, mode: Mode, sign: float) -> list[Complex]:
         middle = bar.between(q[:-1], dq, np.full(len(dq), 0.5))
         own = (side_A(middle) > slack) & (side_E(middle) > slack * leg.size)
         pieces += [bar.joints(piece)[2] for piece in runs(q, own)]
+
     return pieces

@@ -49,7 +49,8 @@ def survey(leg: FiveBar, cells: int = CELLS) -> Map:
     foot = np.stack(np.meshgrid(line, line), axis=-1)
     distance = region.distance(leg, foot, mode=leg.mode)
     within = distance > 0.0
-    rows, columns = _span(np.any(within, axis=1)), _span(np.any(within, axis=0))
+    rows = _span(np.any(within, axis=1))
+    columns = _span(np.any(within, axis=0))
     return Map(line[columns], line[rows], distance[rows, columns])
 
 
