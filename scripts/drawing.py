@@ -17,7 +17,10 @@ from fivebar_sim import FiveBar, kinematics
 from fivebar_sim.arrays import Array
 
 OUT = Path(__file__).resolve().parent.parent / "docs" / "mechanism.svg"
-LEFT, RIGHT, DARK, GREY = "#1f77b4", "#e67e22", "#2b2d31", "#888888"
+LEFT = "#1f77b4"
+RIGHT = "#e67e22"
+DARK = "#2b2d31"
+GREY = "#888888"
 
 
 def link(

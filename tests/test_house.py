@@ -9,7 +9,9 @@ import sys
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
+import house
 import pytest
+from house import Edge
 from hypothesis import HealthCheck, settings
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -57,17 +59,6 @@ def name(path: Path) -> str:
     return path.relative_to(ROOT).as_posix()
 
 
-def long_functions(source: str) -> list[str]:
-    """Return "name: lines" of the functions of more than 50 lines, signature to last line."""
-    return [
-        f"{node.name}: {node.end_lineno - node.lineno + 1}"
-        for node in ast.walk(ast.parse(source))
-        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef)
-        and node.end_lineno is not None
-        and node.end_lineno - node.lineno >= 50
-    ]
-
-
 def imports(source: str) -> Iterator[str]:
     """Yield the top-level names of all modules that a source imports, anywhere in it."""
     for node in ast.walk(ast.parse(source)):
@@ -99,18 +90,62 @@ def exporting() -> list[str]:
     return modules
 
 
-@pytest.mark.parametrize("path", FILES, ids=name)
-def test_files_and_functions_are_short(path: Path) -> None:
-    source = path.read_text(encoding="utf-8")
-    assert source.count("\n") <= 300
-    assert long_functions(source) == []
+def shipped(path: Path) -> bool:
+    return name(path).split("/")[0] in ("fivebar_sim", "controllers")
 
 
-def test_what_is_long_is_seen() -> None:
-    body = "\n".join("    pass" for _ in range(49))
-    assert long_functions(f"def f():\n{body}\n") == []
-    assert long_functions(f"class A:\n  async def f():\n{body}\n    pass\n") == ["f: 51"]
+def test_functions_are_short_and_do_one_thing_a_line() -> None:
+    for path in FILES:
+        source = path.read_text(encoding="utf-8")
+        if shipped(path):
+            assert house.long_functions(source) == [], name(path)
+            assert house.length(ast.parse(source)) <= house.MOST_IN_A_FILE, name(path)
+        assert house.double_assignments(source) == [], name(path)
+
+
+def test_long_bodies_have_air() -> None:
+    sources = [path.read_text(encoding="utf-8") for path in FILES if shipped(path)]
+    assert sum(len(house.dense_functions(source)) for source in sources) <= 10
+
+
+def test_what_is_long_or_dense_is_seen() -> None:
+    body = "\n".join("    pass" for _ in range(30))
+    assert house.long_functions(f"def f():\n{body}\n") == []
+    assert house.long_functions(f"class A:\n  async def f():\n{body}\n    pass\n") == ["f: 31"]
+    assert house.length(ast.parse('"""Doc."""\nimport a\nif a:\n    b = 1\n')) == 2
+    assert house.dense_functions(f"def f():\n{body}\n") == ["f"]
+    assert house.dense_functions(f"def f():\n{body}\n\n    pass\n") == []
+    assert house.double_assignments("a, b = 1, 2\na, b = b, a\na, b = c\na = 1, 2\n") == [1]
     assert {"fivebar_sim", "scripts", "tests"} <= {name(path).split("/")[0] for path in FILES}
+
+
+GRAPH = house.edges(ROOT)
+
+
+def test_imports_go_down_only() -> None:
+    """Lazy imports and those for types are counted like all others."""
+    assert len(GRAPH) > 500
+    assert {edge.when for edge in GRAPH} == {"", "lazy", "typing"}
+    assert house.unplaced(GRAPH) == []
+    assert house.upward(GRAPH) == []
+    assert house.circles(GRAPH) == []
+    assert house.circles(house.between_rooms(GRAPH)) == []
+
+
+def test_upward_import_and_circle_are_seen() -> None:
+    up = Edge("fivebar_sim.kinematics.reach", "fivebar_sim.model", "lazy")
+    assert house.upward([*GRAPH, up]) == [up]
+    back = Edge("fivebar_sim.errors", "fivebar_sim.kinematics.reach", "typing")
+    (circle,) = house.circles([*GRAPH, back])
+    assert {"fivebar_sim.errors", "fivebar_sim.kinematics.reach"} <= set(circle)
+    source = "def f():\n    import a\nif TYPE_CHECKING:\n    import b\n"
+    assert [kind for _, kind in house.statements(ast.parse(source))] == ["lazy", "typing"]
+
+
+def test_top_level_and_rooms_are_small() -> None:
+    sizes = house.sizes(ROOT)
+    assert sizes.pop("") <= house.MOST_AT_THE_TOP
+    assert max(sizes.values()) <= house.MOST_IN_A_ROOM
 
 
 def loaded_by(modules: Sequence[str]) -> dict[str, set[str]]:
@@ -135,13 +170,11 @@ def test_pure_rooms_import_nothing_heavy() -> None:
 
 
 def test_package_never_imports_controllers() -> None:
-    assert list(imports("def f():\n    from fivebar_controllers.x import y, z\n")) == [
-        "fivebar_controllers"
-    ]
+    lazy = "def f():\n    from fivebar_controllers.x import y, z\n"
+    assert list(imports(lazy)) == ["fivebar_controllers"]
     for path in (ROOT / "fivebar_sim").rglob("*.py"):
-        assert "fivebar_controllers" not in set(imports(path.read_text(encoding="utf-8"))), name(
-            path
-        )
+        found = set(imports(path.read_text(encoding="utf-8")))
+        assert "fivebar_controllers" not in found, name(path)
 
 
 def test_scripts_and_tests_are_not_imported_by_what_ships() -> None:

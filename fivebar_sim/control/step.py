@@ -114,7 +114,8 @@ class ControlStep:
 
     def moved(self, theta: Array, theta_dot: Array) -> None:
         """Take note of the motor angles [rad] and rates [rad/s] of the last steps, (nsim, n, 2)."""
-        self._theta, self._theta_dot = _last(self._theta, theta), _last(self._theta_dot, theta_dot)
+        self._theta = _last(self._theta, theta)
+        self._theta_dot = _last(self._theta_dot, theta_dot)
 
     def observe(self, k: Steps) -> Observation:
         """Return what is seen at step k; the time is (nsim,) if k is."""

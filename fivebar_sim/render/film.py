@@ -150,7 +150,8 @@ class Stage:
         self._rect = mujoco.MjrRect(0, 0, width, height)
         scene.dress(replay, self.camera, max(width, height))
         model = replay.model
-        model.vis.global_.offwidth, model.vis.global_.offheight = width, height
+        model.vis.global_.offwidth = width
+        model.vis.global_.offheight = height
         self._data = mujoco.MjData(model)
         self.scene = mujoco.MjvScene(model, scene.GEOMS)
         self._option = mujoco.MjvOption()

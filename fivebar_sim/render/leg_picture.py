@@ -42,7 +42,8 @@ class LegPicture:
         self._option = mujoco.MjvOption()
         self._camera = mujoco.MjvCamera()
         self._camera.type = mujoco.mjtCamera.mjCAMERA_FREE
-        self._camera.azimuth, self._camera.elevation = 90.0, DOWN
+        self._camera.azimuth = 90.0
+        self._camera.elevation = DOWN
         self._camera.distance = FAR * leg.size
         self._gl = gl.context(gl.find(), WIDTH, HEIGHT)
         self._freed = weakref.finalize(self, self._gl.free)  # at the latest before Python ends

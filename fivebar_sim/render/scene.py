@@ -11,10 +11,10 @@ from typing import NamedTuple
 
 import mujoco
 import numpy as np
-from numpy.typing import ArrayLike
 
 from fivebar_sim import kinematics
 from fivebar_sim.arrays import Array
+from fivebar_sim.render.pen import Colour, Pen
 from fivebar_sim.render.replay import Replay
 
 FIELD = 20.0
@@ -31,7 +31,6 @@ SLATS = 8
 GEOMS = 2000
 """Room of a scene."""
 
-Colour = tuple[float, float, float]
 GREEN = (0.12, 0.60, 0.30)
 RED = (0.84, 0.16, 0.24)
 PALE = (0.93, 0.78, 0.80)
@@ -114,7 +113,8 @@ def dress(replay: Replay, camera: Camera, pixels: int = 1024) -> None:
     model.vis.global_.fovy = camera.field
     model.stat.center[:] = camera.centre
     model.stat.extent = size
-    model.vis.map.znear, model.vis.map.zfar = 0.1, 60.0
+    model.vis.map.znear = 0.1
+    model.vis.map.zfar = 60.0
     model.vis.quality.shadowsize = 2 * pixels
     floor = model.geom("floor")
     floor.size[:2] = 0.0  # without end
@@ -145,7 +145,7 @@ def decorate(scene: mujoco.MjvScene, replay: Replay, row: int, eye: Array) -> No
     """
     leg = replay.scenario.leg
     hip = np.array([0.0, replay.hip[row]])
-    pen = _Pen(scene, eye, 1.6 * leg.foot_radius + leg.radius)
+    pen = Pen(scene, eye, 1.6 * leg.foot_radius + leg.radius)
     _pins(pen, replay, row, hip)
     path = pen.before(_path(replay) + hip)  # the trail is thinner at its end, thicker at the foot
 
@@ -178,7 +178,7 @@ def _trail(replay: Replay, row: int) -> Array:
     return replay.foot[np.maximum(row - np.round(back).astype(int), 0)]
 
 
-def _pins(pen: _Pen, replay: Replay, row: int, hip: Array) -> None:
+def _pins(pen: Pen, replay: Replay, row: int, hip: Array) -> None:
     """Draw the pins of the joints A, E, B and D."""
     leg = replay.scenario.leg
     points = kinematics.chain_points(leg, replay.qpos[row, -4:])
@@ -186,7 +186,7 @@ def _pins(pen: _Pen, replay: Replay, row: int, hip: Array) -> None:
         pen.pin(pen.before(joint + hip), 0.5 * leg.radius, PIN)
 
 
-def _force(pen: _Pen, replay: Replay, row: int, hip: Array) -> None:
+def _force(pen: Pen, replay: Replay, row: int, hip: Array) -> None:
     """Draw the ground's force on the foot; the largest of the run is as long as the leg."""
     leg = replay.scenario.leg
     force = replay.ground[row]
@@ -197,7 +197,7 @@ def _force(pen: _Pen, replay: Replay, row: int, hip: Array) -> None:
         pen.arrow(pen.before(start, 2.0), pen.before(tip, 2.0), 0.45 * leg.foot_radius, VIOLET)
 
 
-def _belt(pen: _Pen, replay: Replay, row: int) -> None:
+def _belt(pen: Pen, replay: Replay, row: int) -> None:
     """Draw marks on the belt that run with it, a whole number of them a period."""
     assert replay.belt is not None
     size = replay.scenario.leg.size
@@ -216,64 +216,3 @@ def _mix(first: Colour, second: Colour, part: float) -> Colour:
     """Return the colour that lies a part of the way from the first to the second."""
     r, g, b = ((1.0 - part) * a + part * z for a, z in zip(first, second, strict=True))
     return r, g, b
-
-
-class _Pen:
-    """Adds geoms to a scene.
-
-    Args:
-        scene: That they are added to.
-        eye: [m], (3,).
-        front: How far things are moved towards the eye [m].
-    """
-
-    def __init__(self, scene: mujoco.MjvScene, eye: Array, front: float) -> None:
-        self._scene = scene
-        self._eye = eye
-        self._front = front
-
-    def before(self, points: Array, times: float = 1.0) -> Array:
-        """Return points (x, z) of the leg plane in front of it, (..., 2) to (..., 3)."""
-        space = np.stack([points[..., 0], np.zeros(points.shape[:-1]), points[..., 1]], axis=-1)
-        ray = self._eye - space
-        return space + times * self._front * ray / np.linalg.norm(ray, axis=-1, keepdims=True)
-
-    def bar(self, start: ArrayLike, end: ArrayLike, radius: float, colour: Colour) -> None:
-        """Add a capsule."""
-        self._connect(mujoco.mjtGeom.mjGEOM_CAPSULE, start, end, radius, colour)
-
-    def arrow(self, start: ArrayLike, end: ArrayLike, radius: float, colour: Colour) -> None:
-        """Add an arrow."""
-        self._connect(mujoco.mjtGeom.mjGEOM_ARROW, start, end, radius, colour)
-
-    def ball(self, centre: Array, radius: float, colour: Colour) -> None:
-        """Add a sphere."""
-        geom = self._new(mujoco.mjtGeom.mjGEOM_SPHERE, colour)
-        geom.size[:] = radius
-        geom.pos[:] = centre
-
-    def pin(self, centre: Array, radius: float, colour: Colour) -> None:
-        """Add a disc that faces +-y."""
-        across = np.array([0.0, 0.1 * radius, 0.0])
-        kind = mujoco.mjtGeom.mjGEOM_CYLINDER
-        self._connect(kind, centre - across, centre + across, radius, colour)
-
-    def _connect(
-        self, kind: int, start: ArrayLike, end: ArrayLike, radius: float, colour: Colour
-    ) -> None:
-        mujoco.mjv_connector(self._new(kind, colour), kind, radius, _point(start), _point(end))
-
-    def _new(self, kind: int, colour: Colour) -> mujoco.MjvGeom:
-        """Return the scene's next geom."""
-        geom = self._scene.geoms[self._scene.ngeom]
-        rgba = np.array([*colour, 1.0], np.float32)
-        mujoco.mjv_initGeom(geom, kind, np.ones(3), np.zeros(3), np.eye(3).ravel(), rgba)
-        geom.category = mujoco.mjtCatBit.mjCAT_DECOR
-        geom.emission = 0.15
-        geom.specular = 0.0
-        self._scene.ngeom += 1
-        return geom
-
-
-def _point(point: ArrayLike) -> Array:
-    return np.asarray(point, dtype=np.float64)
