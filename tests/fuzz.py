@@ -33,6 +33,8 @@ MINUTES = 20.0
 """The long form of all tests together: it ends with whichever comes first."""
 SLOW = [HealthCheck.too_slow, HealthCheck.data_too_large, HealthCheck.filter_too_much]
 """What is no fault here: a simulation takes its time."""
+LEAST = 10_000
+"""Inputs of the long form, however long they take."""
 ROUND = 250
 """Inputs of the long form between two looks at the clock."""
 
@@ -105,6 +107,9 @@ class Bench:
 def check_said(said: Said, args: tuple[str, ...]) -> None:
     """Fail unless an end of the program is one that its users may meet."""
     assert said.status in (0, 1, 2), (args, said)
+    assert "Traceback" not in said.err, (args, said)
+    for text in (said.out, said.err):  # nothing that a terminal obeys
+        assert text.replace("\n", "").isprintable(), (args, said)
     if said.status == 0:
         assert said.err == "", args
     elif said.err.startswith("╭"):  # the parser's own box
@@ -163,7 +168,7 @@ class Law(NamedTuple):
         rounds = math.ceil(INPUTS * self.share / ROUND)
         for done in range(1, rounds + 1):
             self._try(bench, ROUND, done)
-            if time.monotonic() > end:
+            if time.monotonic() > end and done * ROUND >= LEAST * self.share:
                 return done * ROUND
         return rounds * ROUND
 

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+import io
+from typing import Any, NamedTuple
 
-from fuzz_inputs import Strategy, jsons, mutated
+import numpy as np
+import pyarrow
+import pyarrow.parquet
+from fuzz_inputs import SCALARS, Strategy, jsons, mutated
 from hypothesis import strategies as st
 
 DAMAGE = [
@@ -52,6 +56,48 @@ def damages(draw: st.DrawFn, contents: dict[str, bytes]) -> Damage:
     return Damage(file, how, content, other)
 
 
+NUMBERS = [value for value in SCALARS if type(value) is float]
+OTHERS: list[Any] = [None, "x", True, 1, "\x1b[31m"]
+
+
+@st.composite
+def records(draw: st.DrawFn, content: bytes) -> bytes:
+    """Return what may be a record: sound Parquet of other columns, rows, types or numbers."""
+    if draw(st.integers(0, 3)) == 0:
+        return draw(mutated(content))
+    table = pyarrow.parquet.read_table(pyarrow.BufferReader(content))
+    columns: dict[str, Any] = {name: table[name].to_numpy() for name in table.column_names}
+    for _ in range(draw(st.integers(1, 3))):
+        name = draw(st.sampled_from(list(columns)))
+        how = draw(st.sampled_from("one one all size other gone more rows".split()))
+        if how == "gone" and len(columns) > 1:
+            del columns[name]
+        elif how == "other":
+            columns[name] = [draw(st.sampled_from(OTHERS))] * len(columns[name])
+        elif how == "more":
+            columns[draw(st.sampled_from(["x", "\x1b[31m", "belt_x", ""]))] = columns[name]
+        elif how == "rows":
+            most = draw(st.integers(0, len(columns[name])))
+            columns = {each: values[:most] for each, values in columns.items()}
+        elif len(columns[name]) and isinstance(columns[name], np.ndarray):
+            columns[name] = _changed(draw, columns[name], how)
+    stream = io.BytesIO()
+    pyarrow.parquet.write_table(pyarrow.table(columns), stream, write_page_checksum=True)
+    return stream.getvalue()
+
+
+def _changed(draw: st.DrawFn, column: Any, how: str) -> Any:
+    """Return a column with one number exchanged, or all of them, or all of another size."""
+    if how == "size":
+        with np.errstate(over="ignore"):
+            return column * 10.0 ** draw(st.integers(-300, 300))
+    number = draw(st.one_of(st.sampled_from(NUMBERS), st.floats(width=64)))
+    at = slice(None) if how == "all" else draw(st.integers(0, len(column) - 1))
+    new = column.copy()
+    new[at] = number
+    return new
+
+
 ARGUMENTS = [
     *("run", "check", "replay", "report", "render", "view", "workspace", "fly"),
     *("--out", "--set", "--quiet", "--json", "--junit", "--summary", "--keep", "--update"),
@@ -59,6 +105,7 @@ ARGUMENTS = [
     *("short.toml", "no.toml", ".", "mine", "out", "out/deep", "a.html", "a.png", "classic", "--"),
     *("leg.L1=0", "leg.L2=0.065", "duration=1e9", "sim.timestep=1e-12", "=", "a=b", "", " ", "-"),
     *("é", "\udcff", "\u202e", "\x1b[31m", "x" * 300, "0", "-1", "nan", "1e308", "70000"),
+    *("--o\x1b[31mut", "a\u2028b", "\x9b31m", "[red]x", ":apple:", "leg.name=\x07", "\x1b=1"),
     *("localhost:1", "127.0.0.1:0", "nobody:1", "--no-such", "-q", "--set=leg.L1=1", "--out="),
 ]
 """Words of a command line; none of them names a place outside of the folder."""

@@ -6,6 +6,7 @@ import functools
 import os
 import shutil
 import tempfile
+import zlib
 from pathlib import Path
 
 import fuzz_damage
@@ -14,6 +15,7 @@ import pyarrow.parquet
 import pytest
 from fuzz import Bench, Law
 from fuzz_damage import Damage
+from fuzz_inputs import jsons, mutated
 from hypothesis import strategies as st
 from shell import ELLIPSE
 
@@ -115,6 +117,47 @@ def any_report(bench: Bench, damage: Damage) -> None:
         page.unlink()
 
 
+def _read_by_all(bench: Bench, name: str, content: bytes) -> None:
+    """Let every reader have a run directory with other content of one of its files."""
+    place = bench.folder / "mine"
+    _restore(place)
+    _restore(bench.folder / "other")
+    (place / name).write_bytes(content)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(recording_check, "reads", _reads_here)
+        said = bench.lawful("replay", "mine")
+    assert said.status == 2
+    sound = "no screen here" in said.err
+    bench.seen["read"] += sound
+    if sound and zlib.crc32(content) % DRAWN:
+        return  # drawing takes a hundred times as long as a refusal
+    for command in (["report", "mine"], ["report", "other", "mine"]):
+        said = bench.lawful(*command, "--out", "page.html", "--quiet")
+        assert (said.status == 0) == sound
+        assert (bench.folder / "page.html").exists() == sound
+        (bench.folder / "page.html").unlink(missing_ok=True)
+
+
+def any_metrics(bench: Bench, content: bytes) -> None:
+    _read_by_all(bench, "metrics.json", content)
+
+
+def any_record(bench: Bench, content: bytes) -> None:
+    _read_by_all(bench, "rollout.parquet", content)
+
+
+def any_recording(bench: Bench, content: bytes) -> None:
+    place = bench.folder / "mine"
+    if not (place / "metrics.json").exists():
+        _restore(place)
+    (place / RECORDING).write_bytes(content)
+    said = bench.lawful("replay", "mine")
+    assert "no screen here" in said.err  # whatever it was, it is one that can be read now
+    read_through(place / RECORDING)
+    kept = (place / RECORDING).read_bytes() == content
+    bench.seen["kept" if kept else "rebuilt"] += 1
+
+
 def any_rerun(bench: Bench, damage: Damage) -> None:
     _restore(bench.folder / "mine")
     _damaged(bench.folder / "mine", damage)
@@ -126,17 +169,25 @@ def any_words(bench: Bench, words: list[str]) -> None:
         return  # one serves until it is stopped, the other draws pictures
     bench.lawful(*words)
     for path in bench.folder.iterdir():
-        if path.name not in ("short.toml", "mine"):
+        if path.name not in ("short.toml", "mine", "other"):
             shutil.rmtree(path) if path.is_dir() else path.unlink()
 
 
+DRAWN = 64
+"""Of the run directories that are sound, one in so many is drawn."""
 SOUND = Damage("recording.rrd", "missing", b"", "metrics.json")
 SOME = st.deferred(lambda: fuzz_damage.damages(contents()))
+METRICS = st.deferred(lambda: jsons(contents()["metrics.json"]))
+RECORDS = st.deferred(lambda: fuzz_damage.records(contents()["rollout.parquet"]))
+RECORDINGS = st.deferred(lambda: mutated(contents()[RECORDING]))
 LAWS = {
-    "replay": Law(SOUND, SOME, any_replay, 8, 0.05),
-    "report": Law(SOUND, SOME, any_report, 2, 0.03),
+    "replay": Law(SOUND, SOME, any_replay, 8, 0.04),
+    "report": Law(SOUND, SOME, any_report, 1, 0.01),
     "rerun": Law(SOUND, SOME, any_rerun, 6, 0.01),
-    "words": Law(["run", "short.toml"], fuzz_damage.arguments, any_words, 25, 0.01),
+    "words": Law(["run", "short.toml"], fuzz_damage.arguments, any_words, 40, 0.02),
+    "metrics": Law(b"{}", METRICS, any_metrics, 40, 0.03),
+    "records": Law(b"PAR1", RECORDS, any_record, 30, 0.03),
+    "recordings": Law(b"RRF2", RECORDINGS, any_recording, 2, 0.005),
 }
 
 

@@ -53,7 +53,8 @@ def test_odd_words_are_told(shell: Shell, odd: str) -> None:
         try:
             said = shell(*command)
         except SystemExit as end:  # the parser's own way out
-            said = Said(int(str(end.code)), *shell.capture.readouterr())
+            out, err = shell.capture.readouterr()
+            said = Said(int(str(end.code)), out, err)
         assert said.status == 2
         assert said.err
         assert _raw(said.out + said.err) == set(), command

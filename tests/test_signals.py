@@ -14,7 +14,7 @@ from contextlib import suppress
 from pathlib import Path
 
 import pytest
-from shell import ELLIPSE, Shell, started
+from shell import Shell, started
 
 from fivebar_sim.cli import program, signals
 from fivebar_sim.errors import ConfigError
@@ -22,7 +22,6 @@ from fivebar_sim.runs import stored
 
 pytestmark = pytest.mark.skipif(os.name == "nt", reason="Windows sends no signals to one process")
 
-FIVEBAR = str(Path(sys.executable).with_name("fivebar"))
 TOLD = """
 import signal, sys
 from fivebar_sim import cli, simulate
@@ -35,6 +34,17 @@ simulate.Legs.advance = told
 sys.exit(cli.main())
 """
 """The program, that does something when it begins to simulate."""
+LISTENS = """
+import sys
+from fivebar_sim import cli
+call = cli._call
+def told(args):
+    print("listens", flush=True)
+    return call(args)
+cli._call = told
+sys.exit(cli.main())
+"""
+"""The program, that says when signals are heard."""
 ENDS = [(signal.SIGINT, 130, "fivebar: interrupted\n"), (signal.SIGTERM, 143, "")]
 LONG = ["run", "short.toml", "--quiet", "--set", "duration=1000", "--out", "mine"]
 
@@ -163,26 +173,26 @@ def _status() -> object:
 @pytest.mark.long
 @pytest.mark.parametrize(("sent", "status", "said"), ENDS)
 def test_signal_at_any_moment_ends_the_program(
-    tmp_path: Path, sent: signal.Signals, status: int, said: str
+    shell: Shell, sent: signal.Signals, status: int, said: str
 ) -> None:
-    """Status and output, at 75 moments of a run: after `main` has begun, and until it has ended."""
-    (tmp_path / "short.toml").write_text(ELLIPSE, encoding="utf-8")
-    command = [FIVEBAR, "run", "short.toml", "--quiet", "--out", "mine"]
-    begun = time.monotonic()
-    rng = random.Random(1)
-    came = Counter[tuple[int, bytes, bool]]()
-    subprocess.run(command, cwd=tmp_path, check=True)
+    """Status and output at 75 moments of a run, from when the program listens to its very end."""
+    run = ["run", "short.toml", "--quiet", "--out"]
+    command, rng = [sys.executable, "-c", LISTENS, *run], random.Random(1)
+    begun, came = time.monotonic(), Counter[tuple[int, bytes, bool]]()
+    subprocess.run([*command, "first"], check=True, stdout=subprocess.DEVNULL)
     takes = time.monotonic() - begun
     for number in range(75):
-        place = tmp_path / f"out{number}"
-        with started([*command[:-1], place.name], cwd=tmp_path) as process:
-            time.sleep(rng.uniform(0.1, 1.1) * takes)
+        place = Path(f"out{number}")
+        with started([*command, place.name]) as process:
+            assert process.stdout is not None
+            assert process.stdout.readline() == b"listens\n"
+            time.sleep(rng.uniform(0.0, takes))
             process.send_signal(sent)
             err = process.communicate()[1]
         if place.exists():
             stored.read(place)
         came[process.returncode, err, place.exists()] += 1
-    assert not list(tmp_path.glob(".*"))
+    assert not list(shell.folder.glob(".*"))
     # a whole run is there if it had ended: nothing to end, or nothing but the interpreter
     assert set(came) <= {(status, said.encode(), False), (0, b"", True), (-sent, b"", True)}
     assert came[status, said.encode(), False] > 30
