@@ -36,36 +36,42 @@ def heard() -> Iterator[None]:
     _sent.clear()
     usual = {signal.SIGINT: signal.default_int_handler, signal.SIGTERM: signal.SIG_DFL}
     before = {n: usual[n] for n in usual if signal.getsignal(n) == usual[n]}
-    through = threading.Event()
-    again = threading.Thread(target=_insist, args=(through,), daemon=True)
-
-    def end(number: int, frame: object) -> None:
-        if not _sent:
-            _sent.append(number)
-        if again.ident is None:
-            again.start()
-        if not _unwinding(sys.exc_info()[1]):
-            raise _ending(_sent[0])
-
-    for number in before:
-        signal.signal(number, end)
 
     unraisable = sys.unraisablehook
+    ended = threading.Event()
+    lock = threading.Lock()
+    # started before any signal comes: a handler may interrupt the starting of another thread
+    threading.Thread(target=_insist, args=(ended, lock), daemon=True).start()
+
+    for number in before:
+        signal.signal(number, _end)
+
     sys.unraisablehook = _quiet
     try:
         yield
     finally:
-        through.set()
-        sys.unraisablehook = unraisable
-        for number, handler in before.items():
-            signal.signal(number, handler)
-        if _sent:  # whatever came of it: nothing, or what an import made of it
-            raise _ending(_sent[0]) from None
+        try:
+            with lock:  # from here on nothing is raised again
+                ended.set()
+        finally:
+            sys.unraisablehook = unraisable
+            for number, handler in before.items():
+                signal.signal(number, handler)
+            if _sent:  # whatever came of it: nothing, or what an import made of it
+                raise _ending(_sent[0]) from None
 
 
 def answered() -> None:
     """Say that the signal did what it should, so that it is no reason to end otherwise."""
     _sent.clear()
+
+
+def _end(number: int, frame: object) -> None:
+    """Raise what the first signal raises, unless it is on its way already."""
+    if not _sent:
+        _sent.append(number)
+    if not _unwinding(sys.exc_info()[1]):
+        raise _ending(_sent[0])
 
 
 def _ending(number: int) -> BaseException:
@@ -86,8 +92,9 @@ def _quiet(lost: sys.UnraisableHookArgs) -> None:
         sys.__unraisablehook__(lost)
 
 
-def _insist(through: threading.Event) -> None:
+def _insist(ended: threading.Event, lock: threading.Lock) -> None:
     """Let the handler run again and again, until the program is out of `heard`."""
-    while not through.wait(PATIENCE):
-        if _sent:
-            _thread.interrupt_main(signal.Signals(_sent[0]))
+    while not ended.wait(PATIENCE):
+        with lock:
+            if _sent and not ended.is_set():
+                _thread.interrupt_main(signal.Signals(_sent[0]))
