@@ -174,7 +174,7 @@ def any_words(bench: Bench, words: list[str]) -> None:
 
 
 class Long(bytes):
-    """Bytes that are not printed: Hypothesis warns of a megabyte of them, instead of what failed."""
+    """Bytes that are not printed: Hypothesis warns of a megabyte of them."""
 
     def __repr__(self) -> str:
         return f"<{len(self)} bytes>"

@@ -24,7 +24,8 @@ pytestmark = pytest.mark.skipif(os.name == "nt", reason="Windows sends no signal
 
 TOLD = """
 import signal, sys
-from fivebar_sim import cli, simulate
+from fivebar_sim.cli import program as cli
+from fivebar_sim.simulation import steps as simulate
 advance = simulate.Legs.advance
 def told(*args):
     {then}
@@ -36,7 +37,7 @@ sys.exit(cli.main())
 """The program, that does something when it begins to simulate."""
 LISTENS = """
 import sys
-from fivebar_sim import cli
+from fivebar_sim.cli import program as cli
 call = cli._call
 def told(args):
     print("listens", flush=True)
