@@ -12,7 +12,8 @@ from fivebar_sim import workspace
 from fivebar_sim.analysis import singularity
 from fivebar_sim.geometry import MODES, FiveBar, Mode
 from fivebar_sim.kinematics.planar import unit
-from fivebar_sim.workspace.coupler import FourBar, cut, trace
+from fivebar_sim.workspace.coupler import cut, trace
+from fivebar_sim.workspace.four_bar import FourBar
 
 BENT = FiveBar(0.05, 0.04, 0.035, 0.07, 0.09, 0.02, 0.5, 0.3)
 MINITAUR = FiveBar.load("minitaur")

@@ -1,19 +1,8 @@
 """Coupler curves: what a point on the middle link of a four-bar draws, as dense polylines.
 
-The plane is complex, with the origin at the crank's pivot and the rocker's pivot at `base` on the
-real axis. With theta the crank's direction, k the coupler's angle from the crank:
-
-    B = crank e^(i theta)
-    C = B + coupler e^(i (theta + k))
-    F = B + offset e^(i (theta + k))
-
-and a pose q = (theta, k) closes the four-bar where
-
-    G(q) = (|C - base|^2 - rocker^2) / 2 = 0,   dG/dq = (base C_y, -Im conj(C - base) (C - B))
-
-A curve is kept as its poses q. Between two neighbours a point is found from the chord in q, set
-onto G = 0 by Newton steps along dG/dq. That has no special pose but the curve's double points
-(both pivots, B and C in line), whereas an angle alone would have its dead centres.
+A curve is kept as its poses q of `FourBar`. Between two neighbours a point is found from the chord
+in q, set onto G = 0 by Newton steps along dG/dq. That has no special pose but the curve's double
+points (both pivots, B and C in line), whereas an angle alone would have its dead centres.
 """
 
 from __future__ import annotations
@@ -21,14 +10,12 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import partial
 from itertools import pairwise
-from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fivebar_sim.arrays import Array, Bools
-
-Complex = NDArray[np.complex128]
+from fivebar_sim.workspace.four_bar import EXACT, FourBar
+from fivebar_sim.workspace.roots import crossing, lowest
 
 STEP = 0.04
 """How far neighbours are apart at most: in both angles and in the direction of F's velocity [rad],
@@ -37,87 +24,8 @@ and in F over `FourBar.scale`."""
 FLOOR = 1e-7
 """Neighbours nearer than this in both angles [rad] are not parted for a turn of the velocity."""
 
-EXACT = 1e-12
-"""Lengths that differ by less, relative to `FourBar.scale`, are equal."""
-
 SPLITS = 60
-"""Halvings at most, of a step in tracing or an interval with a root: to a float's last place."""
-
-
-class FourBar(NamedTuple):
-    """A four-bar with a foot on its coupler; lengths in m, above zero but for `base` and `offset`.
-
-    Attributes:
-        crank: From the origin to B.
-        coupler: From B to C; 0 where B and C are one pin.
-        rocker: From the second pivot to C; one for all poses, or one each, (n,).
-        base: From the origin to the second pivot.
-        offset: F from B, in the frame of the coupler.
-    """
-
-    crank: float
-    coupler: float
-    rocker: float | Array
-    base: float
-    offset: complex
-
-    @property
-    def scale(self) -> float:
-        """What tolerances are relative to [m]."""
-        return self.crank + max(self.coupler, abs(self.offset))
-
-    def joints(self, q: Array) -> tuple[Complex, Complex, Complex]:
-        """Return B, C and F of poses (..., 2), each (...)."""
-        B = self.crank * turn(q[..., 0])
-        along = turn(q[..., 0] + q[..., 1])
-        return B, B + self.coupler * along, B + self.offset * along
-
-    def gradient(self, q: Array) -> tuple[Array, Array]:
-        """Return G [m^2], (...), and dG/dq, (..., 2)."""
-        B, C, _ = self.joints(q)
-        r = C - self.base
-        gap = 0.5 * (np.abs(r) - self.rocker) * (np.abs(r) + self.rocker)
-        return gap, np.stack([self.base * C.imag, -(np.conj(r) * (C - B)).imag], axis=-1)
-
-    def between(self, q: Array, dq: Array, s: Array) -> Array:
-        """Return the poses of the curve at parts s of the chords from q to q + dq."""
-        rounding = np.finfo(float).eps * self.scale**2
-        q = q + s[..., None] * dq
-        for _ in range(3):  # each squares the relative gap, first 1e-3
-            gap, slope = self.gradient(q)
-            square = _norm2(slope)
-            off = (np.abs(gap) > rounding) & (square > 0.0)
-            step = np.where(off, gap / np.where(off, square, 1.0), 0.0)
-            q = q - step[..., None] * slope
-        return q
-
-    def velocity(self, q: Array, dq: Array) -> Complex:
-        """Return dF of one radian along the curve, in the sense of the chord dq, [m], (...)."""
-        _, slope = self.gradient(q)
-        tangent = np.stack([-slope[..., 1], slope[..., 0]], axis=-1)
-        steep = _norm2(slope) > (EXACT * self.scale**2) ** 2
-        tangent = np.where(steep[..., None], tangent, dq)
-        length = np.sqrt(_norm2(tangent))
-        sense = np.where((tangent * dq).sum(axis=-1) < 0.0, -1.0, 1.0)
-        t = tangent * (sense / np.where(length > 0.0, length, 1.0))[..., None]
-        B, _, F = self.joints(q)
-        return 1j * (F * t[..., 0] + (F - B) * t[..., 1])
-
-    def other_elbow(self, q: Array) -> Complex:
-        """Return where C is if the foot stays and crank and coupler bend the other way, (...).
-
-        With w = F e^(-i theta): theta' = theta + 2 arg w, and offset e^(i k) becomes its mirror
-        image. Where F is on the origin the image is C itself.
-        """
-        w = self.crank + self.offset * np.exp(1j * q[..., 1])
-        spin = np.where(w == 0.0, 1.0, w) / np.conj(np.where(w == 0.0, 1.0, w))
-        mirrored = np.conj(self.offset) * np.exp(-1j * q[..., 1]) / self.offset
-        return np.exp(1j * q[..., 0]) * spin * (self.crank + self.coupler * mirrored)
-
-
-def turn(angle: Array) -> Complex:
-    """Return e^(i angle)."""
-    return np.exp(1j * angle)
+"""Halvings at most of a step in tracing: to a float's last place."""
 
 
 def spans(radius: float, base: float, low: float, high: float) -> list[tuple[float, float]]:
@@ -181,27 +89,9 @@ def trace(bar: FourBar) -> list[Array]:
 
 
 def cut(bar: FourBar, q: Array, f: Callable[[Array], Array]) -> Array:
-    """Return a polyline q (n, 2) with the poses put in at which f changes its sign.
-
-    A double root between two poses is looked for where f is as near to zero as it moves from one
-    pose to the next.
-    """
+    """Return a polyline q (n, 2) with the poses put in at which f changes its sign."""
+    q = _part_double_roots(bar, q, f)
     value = f(q)
-    step = np.abs(np.diff(value))
-    around = step + np.append(step[1:], 0.0) + np.insert(step[:-1], 0, 0.0)
-    sign = np.sign(value[:-1])
-    near = (sign == np.sign(value[1:])) & (np.minimum(*np.abs([value[:-1], value[1:]])) <= around)
-    rows = np.flatnonzero(near)
-
-    if rows.size:
-        start = q[rows]
-        dq = q[rows + 1] - q[rows]
-        s = _lowest(lambda s: sign[rows] * f(bar.between(start, dq, s)), len(rows))
-        found = bar.between(start, dq, s)
-        keep = sign[rows] * f(found) < 0.0
-        q = np.insert(q, rows[keep] + 1, found[keep], axis=0)
-        value = f(q)
-
     rows = np.flatnonzero(value[:-1] * value[1:] < 0.0)
     start = q[rows]
     dq = q[rows + 1] - q[rows]
@@ -210,31 +100,30 @@ def cut(bar: FourBar, q: Array, f: Callable[[Array], Array]) -> Array:
     return np.insert(q, rows + 1, bar.between(start, dq, s), axis=0)
 
 
-def crossing(f: Callable[[Array], Array], f_0: Array, f_1: Array) -> Array:
-    """Return where functions that change their sign in [0, 1] are zero, by the Illinois rule.
+def _part_double_roots(bar: FourBar, q: Array, f: Callable[[Array], Array]) -> Array:
+    """Return a polyline with the poses put in that part two roots of f on one segment.
 
-    Args:
-        f: Values at (n,) places, of function 1 to n.
-        f_0: Values at 0.
-        f_1: Values at 1.
+    At both ends of such a segment f has one sign. The other is looked for where f is as near to
+    zero as it moves from one pose to the next.
     """
-    a = np.zeros(len(f_0))
-    b = np.ones(len(f_0))
-    f_a = f_0
-    f_b = f_1
+    value = f(q)
+    step = np.abs(np.diff(value))
 
-    for _ in range(SPLITS):
-        new = b - f_b * (b - a) / np.where(f_b == f_a, 1.0, f_b - f_a)
-        f_new = f(new)
-        flips = f_new * f_b < 0.0
-        a = np.where(flips, b, a)
-        f_a = np.where(flips, f_b, 0.5 * f_a)
-        moved = np.abs(new - b)
-        b = new
-        f_b = f_new
-        if not (moved > 1e-15).any():
-            break
-    return b
+    # Beside an extreme of f its own step is small, so those of both neighbours count.
+    around = step + np.append(step[1:], 0.0) + np.insert(step[:-1], 0, 0.0)
+    sign = np.sign(value[:-1])
+    near = (sign == np.sign(value[1:])) & (np.minimum(*np.abs([value[:-1], value[1:]])) <= around)
+    rows = np.flatnonzero(near)
+    if not rows.size:
+        return q
+
+    start = q[rows]
+    dq = q[rows + 1] - q[rows]
+    s = lowest(lambda s: sign[rows] * f(bar.between(start, dq, s)), len(rows))
+    found = bar.between(start, dq, s)
+    keep = sign[rows] * f(found) < 0.0  # f goes through zero and comes back
+
+    return np.insert(q, rows[keep] + 1, found[keep], axis=0)
 
 
 def runs(q: Array, chosen: Bools) -> list[Array]:
@@ -298,21 +187,3 @@ def _coarse(bar: FourBar, q: Array) -> Bools:
     far = np.maximum(np.abs(np.diff(F)), np.abs(np.diff(other))) > STEP * bar.scale
     angle = np.abs(dq).max(axis=-1)
     return (angle > STEP) | ((far | (turn > STEP)) & (angle > FLOOR))
-
-
-def _lowest(f: Callable[[Array], Array], count: int) -> Array:
-    """Return where in [0, 1] functions 1 to n with one minimum each are least: golden section."""
-    golden = 0.5 * (5.0**0.5 - 1.0)
-    a = np.zeros(count)
-    b = np.ones(count)
-    for _ in range(40):  # to 4e-9: the value to rounding
-        c = b - golden * (b - a)
-        d = a + golden * (b - a)
-        left = f(c) < f(d)
-        a = np.where(left, a, c)
-        b = np.where(left, d, b)
-    return 0.5 * (a + b)
-
-
-def _norm2(v: Array) -> Array:
-    return v[..., 0] ** 2 + v[..., 1] ** 2

@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fivebar_sim.arrays import Array
-from fivebar_sim.workspace.coupler import Complex, FourBar, crossing
+from fivebar_sim.workspace.four_bar import Complex, FourBar
+from fivebar_sim.workspace.roots import crossing
 
 Rows = NDArray[np.intp]
 

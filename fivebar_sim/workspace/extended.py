@@ -31,8 +31,9 @@ from fivebar_sim.errors import GeometryError
 from fivebar_sim.geometry import MODES, FiveBar
 from fivebar_sim.kinematics.closure import ROUNDING, bases
 from fivebar_sim.kinematics.reach import foot_radius_and_angle, inverse_all, reaches
-from fivebar_sim.workspace.coupler import Complex, FourBar, cut, runs, spans, trace, turn
+from fivebar_sim.workspace.coupler import cut, runs, spans, trace
 from fivebar_sim.workspace.curves import Curves, Rows, gathered, nearest_on
+from fivebar_sim.workspace.four_bar import Complex, FourBar, turn
 
 SAME = 1e-13
 """Two elbows whose reach differs by less, relative to the leg's size, end on one boundary."""

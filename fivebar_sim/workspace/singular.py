@@ -6,7 +6,8 @@ import numpy as np
 
 from fivebar_sim.arrays import Array
 from fivebar_sim.geometry import FiveBar, Mode
-from fivebar_sim.workspace.coupler import Complex, FourBar, cut, runs, trace
+from fivebar_sim.workspace.coupler import cut, runs, trace
+from fivebar_sim.workspace.four_bar import Complex, FourBar
 
 
 def singular_pieces(leg: FiveBar, mode: Mode) -> list[Complex]:

@@ -1,0 +1,109 @@
+"""A four-bar with a foot on its coupler, in the complex plane.
+
+The crank's pivot is the origin and the rocker's pivot is at `base` on the real axis. With theta the
+crank's direction, k the coupler's angle from the crank:
+
+    B = crank e^(i theta)
+    C = B + coupler e^(i (theta + k))
+    F = B + offset e^(i (theta + k))
+
+and a pose q = (theta, k) closes the four-bar where
+
+    G(q) = (|C - base|^2 - rocker^2) / 2 = 0,   dG/dq = (base C_y, -Im conj(C - base) (C - B))
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fivebar_sim.arrays import Array
+
+Complex = NDArray[np.complex128]
+
+EXACT = 1e-12
+"""Lengths that differ by less, relative to `FourBar.scale`, are equal."""
+
+
+class FourBar(NamedTuple):
+    """A four-bar with a foot on its coupler; lengths in m, above zero but for `base` and `offset`.
+
+    Attributes:
+        crank: From the origin to B.
+        coupler: From B to C; 0 where B and C are one pin.
+        rocker: From the second pivot to C; one for all poses, or one each, (n,).
+        base: From the origin to the second pivot.
+        offset: F from B, in the frame of the coupler.
+    """
+
+    crank: float
+    coupler: float
+    rocker: float | Array
+    base: float
+    offset: complex
+
+    @property
+    def scale(self) -> float:
+        """What tolerances are relative to [m]."""
+        return self.crank + max(self.coupler, abs(self.offset))
+
+    def joints(self, q: Array) -> tuple[Complex, Complex, Complex]:
+        """Return B, C and F of poses (..., 2), each (...)."""
+        B = self.crank * turn(q[..., 0])
+        along = turn(q[..., 0] + q[..., 1])
+        return B, B + self.coupler * along, B + self.offset * along
+
+    def gradient(self, q: Array) -> tuple[Array, Array]:
+        """Return G [m^2], (...), and dG/dq, (..., 2)."""
+        B, C, _ = self.joints(q)
+        r = C - self.base
+        gap = 0.5 * (np.abs(r) - self.rocker) * (np.abs(r) + self.rocker)
+        return gap, np.stack([self.base * C.imag, -(np.conj(r) * (C - B)).imag], axis=-1)
+
+    def between(self, q: Array, dq: Array, s: Array) -> Array:
+        """Return the poses of the curve at parts s of the chords from q to q + dq."""
+        rounding = np.finfo(float).eps * self.scale**2
+        q = q + s[..., None] * dq
+
+        for _ in range(3):  # each squares the relative gap, first 1e-3
+            gap, slope = self.gradient(q)
+            square = _norm2(slope)
+            off = (np.abs(gap) > rounding) & (square > 0.0)
+            step = np.where(off, gap / np.where(off, square, 1.0), 0.0)
+            q = q - step[..., None] * slope
+
+        return q
+
+    def velocity(self, q: Array, dq: Array) -> Complex:
+        """Return dF of one radian along the curve, in the sense of the chord dq, [m], (...)."""
+        _, slope = self.gradient(q)
+        tangent = np.stack([-slope[..., 1], slope[..., 0]], axis=-1)
+        steep = _norm2(slope) > (EXACT * self.scale**2) ** 2
+        tangent = np.where(steep[..., None], tangent, dq)
+        length = np.sqrt(_norm2(tangent))
+        sense = np.where((tangent * dq).sum(axis=-1) < 0.0, -1.0, 1.0)
+        t = tangent * (sense / np.where(length > 0.0, length, 1.0))[..., None]
+        B, _, F = self.joints(q)
+        return 1j * (F * t[..., 0] + (F - B) * t[..., 1])
+
+    def other_elbow(self, q: Array) -> Complex:
+        """Return where C is if the foot stays and crank and coupler bend the other way, (...).
+
+        With w = F e^(-i theta): theta' = theta + 2 arg w, and offset e^(i k) becomes its mirror
+        image. Where F is on the origin the image is C itself.
+        """
+        w = self.crank + self.offset * np.exp(1j * q[..., 1])
+        spin = np.where(w == 0.0, 1.0, w) / np.conj(np.where(w == 0.0, 1.0, w))
+        mirrored = np.conj(self.offset) * np.exp(-1j * q[..., 1]) / self.offset
+        return np.exp(1j * q[..., 0]) * spin * (self.crank + self.coupler * mirrored)
+
+
+def turn(angle: Array) -> Complex:
+    """Return e^(i angle)."""
+    return np.exp(1j * angle)
+
+
+def _norm2(v: Array) -> Array:
+    return v[..., 0] ** 2 + v[..., 1] ** 2

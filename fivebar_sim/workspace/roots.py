@@ -1,0 +1,53 @@
+"""Where many functions on [0, 1] at once are zero or least."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from fivebar_sim.arrays import Array
+
+STEPS = 60
+"""Steps at most of `crossing`: enough to halve an interval to a float's last place."""
+
+
+def crossing(f: Callable[[Array], Array], f_0: Array, f_1: Array) -> Array:
+    """Return where functions that change their sign in [0, 1] are zero, by the Illinois rule.
+
+    Args:
+        f: Values at (n,) places, of function 1 to n.
+        f_0: Values at 0.
+        f_1: Values at 1.
+    """
+    a = np.zeros(len(f_0))
+    b = np.ones(len(f_0))
+    f_a = f_0
+    f_b = f_1
+
+    for _ in range(STEPS):
+        new = b - f_b * (b - a) / np.where(f_b == f_a, 1.0, f_b - f_a)
+        f_new = f(new)
+        flips = f_new * f_b < 0.0
+        a = np.where(flips, b, a)
+        f_a = np.where(flips, f_b, 0.5 * f_a)
+        moved = np.abs(new - b)
+        b = new
+        f_b = f_new
+        if not (moved > 1e-15).any():
+            break
+    return b
+
+
+def lowest(f: Callable[[Array], Array], count: int) -> Array:
+    """Return where in [0, 1] functions 1 to n with one minimum each are least: golden section."""
+    golden = 0.5 * (5.0**0.5 - 1.0)
+    a = np.zeros(count)
+    b = np.ones(count)
+    for _ in range(40):  # to 4e-9: the value to rounding
+        c = b - golden * (b - a)
+        d = a + golden * (b - a)
+        left = f(c) < f(d)
+        a = np.where(left, a, c)
+        b = np.where(left, d, b)
+    return 0.5 * (a + b)
