@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from fivebar_sim.arrays import Array, Bools, as_pairs, at, first_index
 from fivebar_sim.errors import ArgumentError, LoopOpenError
 from fivebar_sim.geometry import FiveBar
+from fivebar_sim.kinematics.leg_arrays import LegArrays
 from fivebar_sim.kinematics.planar import angle_between, cross, dot, perp, turned, unit
 
 ROUNDING = 16 * np.finfo(float).eps
@@ -38,7 +39,7 @@ class Branch(NamedTuple):
     assembly: NDArray[np.int_]
 
 
-def bases(leg: FiveBar) -> tuple[Array, Array]:
+def bases(leg: FiveBar | LegArrays) -> tuple[Array, Array]:
     """Return the motor axes A and E [m], hip frame: -+ L5 / 2 (cos tilt, sin tilt)."""
     half = 0.5 * leg.L5 * unit(leg.tilt)
     return -half, half
@@ -157,11 +158,11 @@ def passive(leg: FiveBar, theta: ArrayLike, assembly: int | None = None) -> Arra
     return np.stack([theta_B, theta_D], axis=-1)
 
 
-def chain_points(leg: FiveBar, q: Array) -> Points:
+def chain_points(leg: FiveBar | LegArrays, q: Array) -> Points:
     """Return the joints of the two open chains; |C_left C_right| is the loop gap.
 
     Args:
-        leg: The leg.
+        leg: The leg; or n legs, with q of shape (n, 4).
         q: (theta_A, theta_B, theta_E, theta_D) [rad], knees relative to L1 and L4, (..., 4).
     """
     A, E = bases(leg)
@@ -175,7 +176,7 @@ def chain_points(leg: FiveBar, q: Array) -> Points:
     return Points(B, C_left, C_right, D, F)
 
 
-def branch(leg: FiveBar, points: Points) -> Branch:
+def branch(leg: FiveBar | LegArrays, points: Points) -> Branch:
     """Return the working mode and the assembly mode of poses, from where their joints are.
 
         s_A = sign(AF x AB),  s_E = sign(EC x ED),  assembly = sign(BD x BC)

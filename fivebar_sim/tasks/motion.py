@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from fivebar_sim import kinematics
 from fivebar_sim.arrays import Array, Bools
 from fivebar_sim.geometry import FiveBar
+from fivebar_sim.kinematics.leg_arrays import LegArrays
 from fivebar_sim.kinematics.planar import perp
 from fivebar_sim.kinematics.stops import C_STOP, MOTOR_RANGE, angle_at_C
 
@@ -56,7 +57,9 @@ class Motion(NamedTuple):
         return self.height <= TOUCH
 
 
-def motion(leg: FiveBar, qpos: Array, qvel: Array, torque: Array, broken: Bools) -> Motion:
+def motion(
+    leg: FiveBar | LegArrays, qpos: Array, qvel: Array, torque: Array, broken: Bools
+) -> Motion:
     """Return what legs are doing.
 
     The foot's velocity is that of L2, which carries it, with AB and BF the vectors along side A:
@@ -64,7 +67,7 @@ def motion(leg: FiveBar, qpos: Array, qvel: Array, torque: Array, broken: Bools)
         F_dot = perp(AB) theta_dot_A + perp(BF) (theta_dot_A + theta_dot_B)
 
     Args:
-        leg: The leg; or legs `stacked` with one axis.
+        leg: The leg of all rows, or one leg each.
         qpos: (n, nq): the four joints, before them the hip's height if it moves.
         qvel: (n, nq).
         torque: What the motors gave in each step of the period [N m], (n, every, 2).
@@ -86,7 +89,7 @@ def motion(leg: FiveBar, qpos: Array, qvel: Array, torque: Array, broken: Bools)
     return Motion(q, q_dot, p.F, foot_dot, hip, height, torque, reason)
 
 
-def _reason(leg: FiveBar, q: Array, p: kinematics.Points) -> NDArray[np.int64]:
+def _reason(leg: FiveBar | LegArrays, q: Array, p: kinematics.Points) -> NDArray[np.int64]:
     """Return the numbers of the reasons why poses are none of the leg's, 0 where they are, (n,).
 
     The angle at C has its stops where the sine of twice the way from straight is that of C_STOP.
