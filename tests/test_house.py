@@ -31,6 +31,7 @@ PURE = (
     "kinematics",
     "workspace",
     "kinematics.hip",
+    "kinematics.leg_arrays",
     "kinematics.two_link",
     "analysis.singularity",
     "analysis.quality",
@@ -50,7 +51,6 @@ PURE = (
     "control.step",
     "tasks",
     "tasks.episodes",
-    "control.stacked",
 )
 HEAVY = {"mujoco", "rerun", "matplotlib", "scipy"}
 

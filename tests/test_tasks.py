@@ -11,9 +11,9 @@ from hypothesis import strategies as st
 
 from fivebar_sim import FiveBar, dynamics, kinematics, tasks
 from fivebar_sim.control import Observation
-from fivebar_sim.control.servo import Servo
-from fivebar_sim.control.stacked import stacked
+from fivebar_sim.control.servo import Drive, Servo, ServoArrays, applied_torque
 from fivebar_sim.errors import ArgumentError, ConfigError, UnreachableError
+from fivebar_sim.kinematics.leg_arrays import LegArrays
 from fivebar_sim.paths import Circle, Line
 from fivebar_sim.tasks import KINDS, REASONS, Randomise, Task
 from fivebar_sim.tasks.episodes import Episodes, part_at
@@ -140,17 +140,30 @@ def test_masses_given_are_drawn_with_their_inertias() -> None:
 
 
 @given(lengths=st.lists(st.floats(0.05, 0.07), min_size=1, max_size=4))
-def test_stacked_legs_move_as_each_alone(lengths: list[float]) -> None:
+def test_leg_arrays_move_as_each_alone(lengths: list[float]) -> None:
     legs = [FiveBar(L2=length, L3=length) for length in lengths]
     q = np.stack([kinematics.home(leg) for leg in legs])
     torque = np.zeros((len(legs), 1, 2))
     sound = np.zeros(len(legs), bool)
-    together = motion(stacked(legs, 1), q, 0.5 + q, torque, sound)
+    together = motion(LegArrays.of(legs), q, 0.5 + q, torque, sound)
     assert not together.reason.any()
     for row, leg in enumerate(legs):
         alone = at(leg, q[row], 0.5 + q[row])
         np.testing.assert_array_equal(together.foot[row], alone.foot[0])
         np.testing.assert_array_equal(together.foot_dot[row], alone.foot_dot[0])
+
+
+@pytest.mark.parametrize("drive", ["position", "torque"])
+@pytest.mark.parametrize("speed", [None, 40.0])
+def test_servo_arrays_apply_what_each_servo_does(speed: float | None, drive: Drive) -> None:
+    servos = [Servo(kp=kp, kd=kd, limit=0.3, speed=speed) for kp, kd in ((2.0, 0.1), (9.0, 0.02))]
+    ctrl, q, v, q_next, v_next = np.random.default_rng(2).normal(size=(5, 2, 4, 2))
+    both = ServoArrays.of(servos)
+    together = applied_torque(both, "discrete", ctrl, q, v, q_next, v_next, drive)
+    for row, servo in enumerate(servos):
+        own = (ctrl[row], q[row], v[row], q_next[row], v_next[row])
+        alone = applied_torque(servo, "discrete", *own, drive)
+        np.testing.assert_array_equal(together[row], alone)
 
 
 # edge
@@ -300,3 +313,16 @@ def test_a_task_may_be_changed() -> None:
     assert changed.every == 10
     with pytest.raises(ArgumentError, match="period must be a whole number"):
         tasks.task(tasks.task("track"), period=0.0123456)
+
+
+@pytest.mark.parametrize("key", ["limit", "speed", "resolution"])
+def test_refusal_of_servos_that_differ_in_more_than_gains(key: str) -> None:
+    keys = {"limit": 0.3, "speed": 40.0, "resolution": 0.01}
+    servos = [Servo(**keys), Servo(**{**keys, key: 2.0 * keys[key]})]
+    with pytest.raises(ArgumentError, match=rf"^servos of one group must have the same {key}$"):
+        ServoArrays.of(servos)
+
+
+def test_refusal_of_legs_that_differ_in_more_than_lengths() -> None:
+    with pytest.raises(ArgumentError, match=r"^legs of one group must have the same foot_radius$"):
+        LegArrays.of([FiveBar(), FiveBar(foot_radius=0.007)])

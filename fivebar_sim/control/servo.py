@@ -6,6 +6,8 @@ limit       [N m], speed [rad/s]: the DC motor's line, torque limit at rest, non
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
@@ -84,7 +86,7 @@ class Servo(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
     @property
     def back_emf(self) -> float:
         """Torque that the motor loses with its rate, limit / speed [N m s/rad]."""
-        return 0.0 if self.speed is None or self.limit is None else self.limit / self.speed
+        return _back_emf(self)
 
     @property
     def damping(self) -> float:
@@ -93,7 +95,7 @@ class Servo(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
 
     def passive(self, drive: Drive) -> float:
         """Return the rate gain that the limit does not clip, the joint's damping [N m s/rad]."""
-        return self.kd if self.speed is None and drive == "position" else self.back_emf
+        return self.kd if _is_kd_passive(self, drive) else self.back_emf
 
     def latched(self, steps: int, timestep: float) -> NDArray[np.int64]:
         """Return which row of a table of commands acts in each step, (N,); -1 while none has come.
@@ -151,6 +153,49 @@ class Servo(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
         return self.rounded(acting) if drive == "position" else acting
 
 
+@dataclass(frozen=True, slots=True)
+class ServoArrays:
+    """n servos that differ in their gains; attributes are those of `Servo`.
+
+    Attributes:
+        kp: [N m/rad], (n, 1, 1).
+        kd: [N m s/rad], (n, 1, 1).
+        limit, speed, resolution: The same for all servos.
+    """
+
+    kp: Array
+    kd: Array
+    limit: float | None
+    speed: float | None
+    resolution: float
+
+    @classmethod
+    def of(cls, servos: Sequence[Servo]) -> ServoArrays:
+        """Return the arrays of some servos.
+
+        Raises:
+            ArgumentError: Servos that differ in limit, speed or resolution.
+        """
+        first = servos[0]
+        for name in ("limit", "speed", "resolution"):
+            if any(getattr(servo, name) != getattr(first, name) for servo in servos):
+                raise ArgumentError(f"servos of one group must have the same {name}")
+
+        kp = np.array([[[servo.kp]] for servo in servos])
+        kd = np.array([[[servo.kd]] for servo in servos])
+        return cls(kp, kd, first.limit, first.speed, first.resolution)
+
+    @property
+    def back_emf(self) -> float:
+        """As in `Servo` [N m s/rad]."""
+        return _back_emf(self)
+
+    @property
+    def damping(self) -> Array:
+        """As in `Servo` [N m s/rad], (n, 1, 1)."""
+        return self.kd + self.back_emf
+
+
 def read_table(source: str | Path) -> tables.Table:
     """Return the TOML table of a servo: of a preset's name, or of a file's path.
 
@@ -166,7 +211,9 @@ def read_table(source: str | Path) -> tables.Table:
     return table
 
 
-def saturated(servo: Servo, ctrl: Array, q: Array, v: Array, drive: Drive = "position") -> Bools:
+def saturated(
+    servo: Servo | ServoArrays, ctrl: Array, q: Array, v: Array, drive: Drive = "position"
+) -> Bools:
     """Return whether the limit clips in a step: it is decided with the state at its start.
 
         position:  |kp (u - q)| > limit,  with speed |kp (u - q) - kd v| > limit
@@ -188,7 +235,7 @@ def saturated(servo: Servo, ctrl: Array, q: Array, v: Array, drive: Drive = "pos
 
 
 def applied_torque(
-    servo: Servo,
+    servo: Servo | ServoArrays,
     integrator: Integrator,
     ctrl: Array,
     q: Array,
@@ -226,10 +273,21 @@ def applied_torque(
     if servo.limit is not None:
         side = np.sign(_asked(servo, ctrl, q, v, drive))
         asked = np.where(saturated(servo, ctrl, q, v, drive), side * servo.limit, asked)
-    return asked - servo.passive(drive) * v_next
+    passive = servo.kd if _is_kd_passive(servo, drive) else servo.back_emf
+    return asked - passive * v_next
 
 
-def _asked(servo: Servo, ctrl: Array, q: Array, v: Array, drive: Drive) -> Array:
+def _back_emf(servo: Servo | ServoArrays) -> float:
+    """Return limit / speed [N m s/rad], 0 without them."""
+    return 0.0 if servo.speed is None or servo.limit is None else servo.limit / servo.speed
+
+
+def _is_kd_passive(servo: Servo | ServoArrays, drive: Drive) -> bool:
+    """Return whether kd is the joint's damping, and not within what the limit clips."""
+    return servo.speed is None and drive == "position"
+
+
+def _asked(servo: Servo | ServoArrays, ctrl: Array, q: Array, v: Array, drive: Drive) -> Array:
     """Return what the limit clips [N m]."""
     if drive == "torque":
         return ctrl

@@ -15,8 +15,7 @@ from fivebar_sim.arrays import Array
 from fivebar_sim.checks import LARGEST, check_number
 from fivebar_sim.control.interface import Drive, Observation
 from fivebar_sim.control.sensors import Sensors
-from fivebar_sim.control.servo import Servo
-from fivebar_sim.control.stacked import stacked
+from fivebar_sim.control.servo import Servo, ServoArrays
 from fivebar_sim.errors import ArgumentError
 
 DRAWN = 64
@@ -73,7 +72,8 @@ class ControlStep:
         nsim = len(start)
         servos = [servo] * nsim if isinstance(servo, Servo) else list(servo)
         self.every = every
-        self._servo = stacked(servos, 2)
+        ServoArrays.of(servos)  # refuses servos that differ in more than gains and bus
+        self._servo = servos[0]  # of which only what all have in common is used
         self._sensors = sensors
         self._drive = drive
         self._h = timestep

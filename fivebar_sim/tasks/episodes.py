@@ -13,10 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fivebar_sim.arrays import Array, Bools, as_vectors
-from fivebar_sim.control.servo import applied_torque
-from fivebar_sim.control.stacked import stacked
+from fivebar_sim.control.servo import ServoArrays, applied_torque
 from fivebar_sim.control.step import ControlStep
 from fivebar_sim.errors import ArgumentError
+from fivebar_sim.kinematics.leg_arrays import LegArrays
 from fivebar_sim.tasks.base import Part, Task
 from fivebar_sim.tasks.motion import TIME, motion
 
@@ -65,10 +65,9 @@ class Episodes:
         self.task = task
         self.size = len(drawn)
         self.low, self.high = task.bounds
-        self._leg = stacked([each.leg for each in drawn], 1)
+        self._leg = LegArrays.of([each.leg for each in drawn])
         servos = [each.servo for each in drawn]
-        self._servo = stacked(servos, 2)
-        self._lead = stacked(servos, 1)
+        self._servo = ServoArrays.of(servos)
         self._starts = starts
         self._targets = np.concatenate(list(task.targets().values()), axis=1)
         self._weights = {name: task.weight(name) for name in task.WEIGHTS}
@@ -140,7 +139,7 @@ class Episodes:
         """
         command = action
         if self.task.action == "motion":
-            lead = self._lead.damping / self._lead.kp
+            lead = (self._servo.damping / self._servo.kp)[:, 0]
             command = action[:, :2] + lead * action[:, 2:]
         periods = np.minimum(self._count, self.task.periods - 1)  # those that are over wait
         self._ctrl = self._control.send(periods * self.task.every, command)
