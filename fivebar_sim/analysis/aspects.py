@@ -181,6 +181,8 @@ def _aspect(leg: FiveBar, points: Points, cells: int) -> Aspect:
     q = _directions(leg, points)
     near = _corners(q, _sheets(leg, points), cells)
     gap = np.abs(wrap(atlas.q[near] - q[..., None, :])).max(axis=-1)
+
+    # Nodes of another triple lie beyond a fold; the nearest of the rest decides.
     linked = (atlas.triple[near] == triple[..., None, :]).all(axis=-1)
     best = np.argmin(np.where(linked, gap, np.inf), axis=-1)[..., None]
     part = np.where(linked.any(axis=-1), np.take_along_axis(atlas.part[near], best, -1)[..., 0], 0)
@@ -259,17 +261,17 @@ def _sheets(leg: FiveBar, p: Points) -> Ints:
 
 
 def _corners(q: Array, sheet: Ints, cells: int) -> Ints:
-    """Return the flat numbers of the nodes around poses, four in each of the charts, (..., 12).
-
-    A node itself is the least corner of its cell, whatever the rounding (1e-9 of a cell).
-    """
+    """Return the flat numbers of the nodes around poses, four in each of the charts, (..., 12)."""
+    # A node itself is the least corner of its cell, so 1e-9 of a cell keeps rounding from it.
     low = np.floor((q + np.pi) / (2.0 * np.pi / cells) - 0.5 + 1e-9).astype(int)
-    flat = [
-        ((2 * k + sheet[..., k]) * cells + (low[..., i] + up) % cells) * cells
-        + (low[..., j] + right) % cells
-        for k, (i, j) in enumerate(CHARTS)
-        for up, right in np.ndindex(2, 2)
-    ]
+    flat = []
+    for k, (i, j) in enumerate(CHARTS):
+        grid = 2 * k + sheet[..., k]
+        for up, right in np.ndindex(2, 2):
+            row = (low[..., i] + up) % cells  # the grid closes after a turn
+            column = (low[..., j] + right) % cells
+            flat.append((grid * cells + row) * cells + column)
+
     return np.stack(flat, axis=-1)
 
 

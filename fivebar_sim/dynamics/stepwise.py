@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 
 from fivebar_sim.arrays import Array, as_pairs, as_vectors, at, finite, first_index
 from fivebar_sim.checks import check_number
-from fivebar_sim.dynamics.chain import Chain, Four, Pose, Vector, cross
+from fivebar_sim.dynamics.chain import Chain, Four, Pose, Vector, cross, dot
 from fivebar_sim.dynamics.motion import TURN_MAX
 from fivebar_sim.errors import ArgumentError, DivergedError, SingularError
 from fivebar_sim.geometry import FiveBar
@@ -116,9 +116,9 @@ def soft_loop(
     if q.ndim != 2:
         raise ArgumentError(f"q must have shape (N + 1, 4), got {q.shape}")
     steps = _Steps.of(q, timestep)
-    pulled = _pulled(chain, steps, timestep, damping)
+    pulled = _pull_left(chain, steps, timestep, damping)
     start = float(steps.psi[2][0]), float(steps.psi[3][0])
-    psi3, psi4 = _trailing(chain, pulled, start, timestep, damping).T
+    psi3, psi4 = _trail(chain, pulled, start, timestep, damping).T
     return np.stack([q[:, 0], q[:, 1], psi4, psi3 - psi4], axis=-1)
 
 
@@ -181,7 +181,7 @@ def _in_line(joints: str, sine: float, index: tuple[int, ...]) -> SingularError:
     )
 
 
-def _pulled(chain: Chain, steps: _Steps, h: float, damping: float) -> Array:
+def _pull_left(chain: Chain, steps: _Steps, h: float, damping: float) -> Array:
     """Return P_left + k (A - E) of every step [m/s^2], (N, 2)."""
     k, b = pull(h)
     p = _pose(chain, steps.psi)
@@ -189,6 +189,8 @@ def _pulled(chain: Chain, steps: _Steps, h: float, damping: float) -> Array:
     a1, a2, _, _ = steps.alpha
     H12, _ = chain.couplings(p)
     share = h * damping / (chain.I1 * chain.I2 - H12 * H12)
+
+    # x = alpha' + b w, where alpha' = M^-1 (M + h D) alpha and D damps A alone, that is row 1.
     x1 = a1 + share * chain.I2 * a1 + b * w1
     x2 = a2 - share * H12 * a1 + b * w2
     f1 = chain.leg.L1 * (k - w1 * w1)
@@ -205,34 +207,21 @@ def _pulled(chain: Chain, steps: _Steps, h: float, damping: float) -> Array:
     )
 
 
-def _trailing(chain: Chain, pulled: Array, start: Vector, h: float, damping: float) -> Array:
+def _trail(chain: Chain, pulled: Array, start: Vector, h: float, damping: float) -> Array:
     """Return (psi_3, psi_4) that trail behind what pulls them [rad], (N + 1, 2)."""
-    k, b = pull(h)
-    L3 = chain.leg.L3
-    L4 = chain.leg.L4
     psi3, psi4 = start
     w3 = 0.0
     w4 = 0.0
     rows = [start]
 
-    for n, (x, z) in enumerate(pulled.tolist()):
-        c3 = math.cos(psi3)
-        s3 = math.sin(psi3)
-        c4 = math.cos(psi4)
-        s4 = math.sin(psi4)
-        f3 = L3 * (k - w3 * w3)
-        f4 = L4 * (k - w4 * w4)
-        x = x - f3 * c3 - f4 * c4
-        z = z - f3 * s3 - f4 * s4
-        sine = c4 * s3 - s4 * c3
+    for n, row in enumerate(pulled.tolist()):
+        e3 = math.cos(psi3), math.sin(psi3)
+        e4 = math.cos(psi4), math.sin(psi4)
+        sine = cross(e4, e3)
         if not abs(sine) > SINGULAR:
             raise _in_line("E, D and C", abs(sine), (n,))
-        alpha4 = (x * c3 + z * s3) / (L4 * sine) - b * w4  # alpha'
-        alpha3 = -(x * c4 + z * s4) / (L3 * sine) - b * w3
-        H43 = L4 * chain.S3[0] * (c4 * c3 + s4 * s3)  # L3's mass lies on its line
-        share = h * damping / (chain.I3 * chain.I4 - H43 * H43)
-        alpha4 /= 1.0 + share * chain.I3
-        alpha3 += share * H43 * alpha4
+
+        alpha3, alpha4 = _follow(chain, row, (e3, e4), (w3, w4), h, damping)
         w3 = w3 + h * alpha3
         w4 = w4 + h * alpha4
         if not (abs(h * w3) < TURN_MAX and abs(h * w4) < TURN_MAX):
@@ -241,7 +230,54 @@ def _trailing(chain: Chain, pulled: Array, start: Vector, h: float, damping: flo
                 f"{TURN_MAX:g} rad in a step; try a smaller timestep",
                 n * h,
             )
+
+        # MuJoCo's step is semi-implicit: the angles move with the new rates.
         psi3 = psi3 + h * w3
         psi4 = psi4 + h * w4
         rows.append((psi3, psi4))
+
     return np.array(rows)
+
+
+def _follow(
+    chain: Chain,
+    pulled: Vector,
+    e: tuple[Vector, Vector],
+    w: Vector,
+    h: float,
+    damping: float,
+) -> Vector:
+    """Return the accelerations of L3 and L4 that keep the loop's equation in one step [rad/s^2].
+
+    Args:
+        chain: The leg's constants.
+        pulled: P_left + k (A - E) [m/s^2].
+        e: Directions of L3 and L4, not in line.
+        w: Their rates [rad/s].
+        h: Timestep [s].
+        damping: Damping of the joint E [N m s/rad].
+    """
+    k, b = pull(h)
+    e3, e4 = e
+    w3, w4 = w
+    L3 = chain.leg.L3
+    L4 = chain.leg.L4
+
+    # Without its terms along e3 and e4, P_right is L3 x3 perp(e3) + L4 x4 perp(e4).
+    f3 = L3 * (k - w3 * w3)
+    f4 = L4 * (k - w4 * w4)
+    x = pulled[0] - f3 * e3[0] - f4 * e4[0]
+    z = pulled[1] - f3 * e3[1] - f4 * e4[1]
+
+    # So its product with e3 leaves x4 alone, and the one with e4 leaves x3; x = alpha' + b w.
+    sine = cross(e4, e3)
+    alpha4 = dot((x, z), e3) / (L4 * sine) - b * w4
+    alpha3 = -dot((x, z), e4) / (L3 * sine) - b * w3
+
+    # From alpha' back to alpha = (M + h D)^-1 M alpha', where only E, and so row 4, is damped.
+    H43 = L4 * chain.S3[0] * dot(e4, e3)  # L3's mass lies on its line
+    share = h * damping / (chain.I3 * chain.I4 - H43 * H43)
+    alpha4 /= 1.0 + share * chain.I3
+    alpha3 += share * H43 * alpha4
+
+    return alpha3, alpha4

@@ -73,29 +73,44 @@ def nearest_on(curves: Curves, bar: FourBar, p: Complex) -> tuple[Rows, Complex,
         F: The minimum [m], (m,).
         pose: For each p the nearest F of the sampled poses [m], (n,).
     """
-    k = curves
-    d = np.abs(p[:, None] - k.F)
-    pose = d.argmin(axis=1)
-    least = d[np.arange(len(p)), pose][:, None]
-    half = 0.51 * np.abs(k.F[k.first + 1] - k.F[k.first])
-    reach = np.minimum(d[:, k.first], d[:, k.first + 1]) - half
-    owner, segment = np.nonzero(reach <= least * (1.0 + 1e-12))
-    from_start = _along(p[owner] - k.F[k.first[segment]], k.leave[segment])
-    from_end = _along(p[owner] - k.F[k.first[segment] + 1], k.arrive[segment])
+    pose, owner, segment = _near_segments(curves, p)
+    start = curves.F[curves.first[segment]]
+    stop = curves.F[curves.first[segment] + 1]
+    from_start = _along(p[owner] - start, curves.leave[segment])
+    from_end = _along(p[owner] - stop, curves.arrive[segment])
+
+    # Only a segment that the foot enters towards p and leaves away from it has a minimum inside.
     turns = (from_start > 0.0) & (from_end < 0.0)
     owner = owner[turns]
     segment = segment[turns]
-    q = k.q[segment]
-    dq = k.dq[segment]
+    q = curves.q[segment]
+    dq = curves.dq[segment]
     at = p[owner]
-    bar = bar._replace(rocker=k.rocker[segment])
+    bar = bar._replace(rocker=curves.rocker[segment])
 
     def slope(s: Array) -> Array:
         here = bar.between(q, dq, s)
         return _along(at - bar.joints(here)[2], bar.velocity(here, dq))
 
     s = crossing(slope, from_start[turns], from_end[turns])
-    return owner, bar.joints(bar.between(q, dq, s))[2], k.F[pose]
+    return owner, bar.joints(bar.between(q, dq, s))[2], curves.F[pose]
+
+
+def _near_segments(curves: Curves, p: Complex) -> tuple[Rows, Rows, Rows]:
+    """Return the nearest pose of each p, and the segments that may come nearer still.
+
+    Returns:
+        pose: Row of the nearest of the sampled poses, (n,).
+        owner: Which p a segment is for, (m,).
+        segment: The segment's row, (m,).
+    """
+    d = np.abs(p[:, None] - curves.F)
+    pose = d.argmin(axis=1)
+    least = d[np.arange(len(p)), pose][:, None]
+    half = 0.51 * np.abs(curves.F[curves.first + 1] - curves.F[curves.first])  # of the arc
+    reach = np.minimum(d[:, curves.first], d[:, curves.first + 1]) - half
+    owner, segment = np.nonzero(reach <= least * (1.0 + 1e-12))  # equal to rounding stays in
+    return pose, owner, segment
 
 
 def _along(v: Complex, direction: Complex) -> Array:
