@@ -86,9 +86,7 @@ class Angles(msgspec.Struct, frozen=True, kw_only=True):
 
 def with_mine(controller: Any, *settings: str) -> Plan:
     scenario = Scenario.load("classic-ellipse", [*ASIDE, *settings])
-    return rollout.plan(
-        msgspec.structs.replace(scenario, controller=controller, controller_name="mine")
-    )
+    return rollout.plan(scenario.driven_by(controller))
 
 
 def ctrl(plan: Plan) -> Array:
@@ -233,10 +231,10 @@ def test_refusal_of_a_users_period_that_is_no_time(period: Any) -> None:
     [
         (
             "shape",
-            r"controller 'mine' must command numbers of shape \(1, 2\), got float64 of shape",
+            r"controller 'Mine' must command numbers of shape \(1, 2\), got float64 of shape",
         ),
-        ("text", r"controller 'mine' must command numbers of shape \(1, 2\), got <U1 of shape"),
-        ("error", "controller 'mine' failed: KeyError: 'gain'"),
+        ("text", r"controller 'Mine' must command numbers of shape \(1, 2\), got <U1 of shape"),
+        ("error", "controller 'Mine' failed: KeyError: 'gain'"),
     ],
 )
 def test_refusal_of_what_a_controller_answers(wrong: str, message: str, after: float) -> None:
@@ -254,7 +252,7 @@ def test_controller_without_an_answer_says_when_the_foot_left_its_path(wrong: st
     with pytest.raises(DivergedError) as caught:
         rollout.execute(with_mine(Mine(wrong=wrong, after=0.1)))
     said = {"nan": "its command is not finite", "open": "the loop is open"}[wrong]
-    assert f"controller 'mine' has no answer: {said}" in str(caught.value)
+    assert f"controller 'Mine' has no answer: {said}" in str(caught.value)
     assert str(caught.value).startswith("classic-ellipse: the foot left its path at t = 0.1 s; ")
     assert caught.value.time == pytest.approx(0.1)  # it had been near until then
     assert "\n" not in str(caught.value)

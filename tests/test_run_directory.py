@@ -13,8 +13,9 @@ from typing import Any, NoReturn
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
+from fivebar_controllers.pd import Pd
 
-from fivebar_sim import rollout
+from fivebar_sim import report, rollout
 from fivebar_sim.errors import RunDirectoryError
 from fivebar_sim.recording import rrd
 from fivebar_sim.rollout import Result
@@ -111,6 +112,19 @@ def test_run_of_a_run_is_the_same_run(tmp_path: Path) -> None:
     again.write(where)
     assert names(where) == {*FILES, "q8bot_trot.csv"}
     assert names(tmp_path) == {"trot"}
+
+
+def test_run_of_another_controller_is_read_again(tmp_path: Path) -> None:
+    loaded = Scenario.load("classic-ellipse", ["duration=0.5", "path.frequency=4", "limits={}"])
+    first = rollout.run(loaded.driven_by(Pd(kp=3.0)))
+    where = first.write(tmp_path / "steered")
+    report.write([where])
+    assert (where / "report.html").is_file()
+    read = Scenario.load(where / "scenario.toml")
+    assert (read.controller_name, read.controller) == ("pd", Pd(kp=3.0))
+    again = rollout.run(read)
+    for name in COLUMNS:
+        np.testing.assert_array_equal(again.record[name], first.record[name])
 
 
 # edge

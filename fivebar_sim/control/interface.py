@@ -132,3 +132,11 @@ def find(name: str) -> type[Any]:
         )
 
     return kind
+
+
+def name_of(controller: object) -> str:
+    """Return the name of a controller's entry point, or of its class if it has none."""
+    kind = type(controller)
+    value = f"{kind.__module__}:{kind.__qualname__}"
+    named = (name for name, entry in known().items() if entry.value == value)
+    return next(named, kind.__name__)

@@ -8,10 +8,7 @@ from math import inf
 from pathlib import Path
 from typing import Any
 
-import msgspec
-import tomli_w
-
-from fivebar_sim import control, rollout
+from fivebar_sim import rollout
 from fivebar_sim.checks import check_number
 from fivebar_sim.control import Feedback, Setpoints
 from fivebar_sim.errors import ArgumentError, ConfigError, FiveBarError, unknown
@@ -168,32 +165,4 @@ class LegRunner:
         for setting in settings:
             if tables.parse_setting(setting)[0][0] == "controller":
                 raise ConfigError(f"settings change the controller, and one is given: {setting!r}")
-        return driven(Scenario.load(place, [*settings, "controller={}"]), controller)
-
-
-def driven(scenario: Scenario, controller: Setpoints | Feedback) -> Scenario:
-    """Return a scenario that another controller drives.
-
-    In its table the controller has the name of its entry point, or of its class if it has none.
-
-    Raises:
-        ConfigError: The object is no controller, or has a field that no TOML could hold.
-    """
-    ours = isinstance(controller, (Setpoints, Feedback))
-    if not ours or not isinstance(controller, msgspec.Struct):
-        raise ConfigError(
-            "controller must be a msgspec Struct with setpoints(), or with command(), drive and "
-            f"period, got {controller!r}"
-        )
-
-    kind = type(controller)
-    value = f"{kind.__module__}:{kind.__qualname__}"
-    named = (name for name, entry in control.known().items() if entry.value == value)
-    name = next(named, kind.__name__)
-    scenario = msgspec.structs.replace(scenario, controller=controller, controller_name=name)
-
-    try:
-        tomli_w.dumps(scenario.table())
-    except TypeError as error:
-        raise ConfigError(f"controller {name!r} has a field that is no TOML: {error}") from None
-    return scenario
+        return Scenario.load(place, [*settings, "controller={}"]).driven_by(controller)

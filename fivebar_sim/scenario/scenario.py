@@ -9,10 +9,11 @@ from pathlib import Path
 
 import msgspec
 import numpy as np
+import tomli_w
 
 from fivebar_sim import paths
 from fivebar_sim.arrays import Array
-from fivebar_sim.control import Feedback, Setpoints
+from fivebar_sim.control import Feedback, Setpoints, name_of
 from fivebar_sim.control.sensors import Sensors
 from fivebar_sim.control.servo import Servo
 from fivebar_sim.errors import ArgumentError, ConfigError, unknown
@@ -174,6 +175,29 @@ class Scenario(msgspec.Struct, frozen=True, kw_only=True):
         _check_scene(scenario, where)
 
         return scenario
+
+    def driven_by(self, controller: Setpoints | Feedback) -> Scenario:
+        """Return the same scenario with another controller, under that one's name.
+
+        The name is that of the controller's entry point, or of its class if it has none.
+
+        Raises:
+            ConfigError: The object is no controller, or has a field that no TOML could hold.
+        """
+        ours = isinstance(controller, (Setpoints, Feedback))
+        if not ours or not isinstance(controller, msgspec.Struct):
+            raise ConfigError(
+                "controller must be a msgspec Struct with setpoints(), or with command(), drive "
+                f"and period, got {controller!r}"
+            )
+
+        name = name_of(controller)
+        driven = msgspec.structs.replace(self, controller=controller, controller_name=name)
+        try:
+            tomli_w.dumps(driven.table())
+        except TypeError as error:
+            raise ConfigError(f"controller {name!r} has a field that is no TOML: {error}") from None
+        return driven
 
     def table(self) -> Table:
         """Return the resolved scenario as a TOML table: the leg spelt out, every default written.
