@@ -9,19 +9,60 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from fivebar_sim import dynamics, kinematics, model, workspace
+    from fivebar_sim import dynamics, errors, kinematics, model, workspace
+    from fivebar_sim.control import Feedback, Setpoints
+    from fivebar_sim.control.servo import Servo
     from fivebar_sim.geometry import FiveBar
-    from fivebar_sim.rollout import run
+    from fivebar_sim.kinematics import hip, two_link
+    from fivebar_sim.rollout import Result, run, run_all
     from fivebar_sim.scenario import Scenario
 
 __version__ = "0.1.0"
-__all__ = ["FiveBar", "Scenario", "dynamics", "kinematics", "model", "run", "workspace"]
+__all__ = [
+    "Feedback",
+    "FiveBar",
+    "Result",
+    "Scenario",
+    "Servo",
+    "Setpoints",
+    "dynamics",
+    "errors",
+    "hip",
+    "kinematics",
+    "model",
+    "run",
+    "run_all",
+    "two_link",
+    "workspace",
+]
 
-_HOMES = {"FiveBar": "geometry", "Scenario": "scenario", "run": "rollout"}
+_MODULES = {
+    **{name: name for name in ("dynamics", "errors", "kinematics", "model", "workspace")},
+    "hip": "kinematics.hip",
+    "two_link": "kinematics.two_link",
+}
+"""The exported modules, and where they are."""
+
+_HOMES = {
+    "Feedback": "control",
+    "FiveBar": "geometry",
+    "Result": "rollout",
+    "Scenario": "scenario",
+    "Servo": "control.servo",
+    "Setpoints": "control",
+    "run": "rollout",
+    "run_all": "rollout",
+}
+"""The module that each other export is of."""
 
 
 def __getattr__(name: str) -> Any:
-    if name not in __all__:
-        raise AttributeError(f"module 'fivebar_sim' has no attribute {name!r}")
-    module = importlib.import_module(f"fivebar_sim.{_HOMES.get(name, name)}")
-    return getattr(module, name) if name in _HOMES else module
+    if name in _MODULES:
+        return importlib.import_module(f"fivebar_sim.{_MODULES[name]}")
+    if name in _HOMES:
+        return getattr(importlib.import_module(f"fivebar_sim.{_HOMES[name]}"), name)
+    raise AttributeError(f"module 'fivebar_sim' has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

@@ -36,6 +36,24 @@ class Result(NamedTuple):
     metrics: dict[str, Any]
     limits: list[Limit]
 
+    def __repr__(self) -> str:
+        """Return name and verdict: the record would fill pages."""
+        return f"Result({self.scenario.name!r}: {self.verdict}, {self.scenario.steps} steps)"
+
+    @classmethod
+    def read(cls, path: str | Path) -> Result:
+        """Return the result that a run directory holds.
+
+        Raises:
+            RunDirectoryError: It is incomplete, or a file of it is damaged or foreign; names the
+                file.
+        """
+        from fivebar_sim.runs import stored
+
+        found = stored.read(Path(path))
+        limits = judge(found.metrics, found.scenario.limits)
+        return cls(found.scenario, found.record, found.metrics, limits)
+
     @property
     def verdict(self) -> str:
         """Either "pass" or "fail"."""

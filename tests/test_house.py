@@ -11,8 +11,11 @@ from pathlib import Path
 
 import house
 import pytest
+from hatchling.builders.wheel import WheelBuilder
 from house import Edge
 from hypothesis import HealthCheck, settings
+
+import fivebar_sim
 
 ROOT = Path(__file__).resolve().parents[1]
 FILES = sorted(
@@ -188,6 +191,18 @@ def test_scripts_and_tests_are_not_imported_by_what_ships() -> None:
 def test_every_export_exists(module: str) -> None:
     loaded = importlib.import_module(module)
     assert [each for each in loaded.__all__ if not hasattr(loaded, each)] == []
+
+
+def test_package_shows_what_it_exports() -> None:
+    assert set(fivebar_sim.__all__) <= set(dir(fivebar_sim))
+    assert set(fivebar_sim.__all__) == {*fivebar_sim._MODULES, *fivebar_sim._HOMES}
+    with pytest.raises(AttributeError, match="no attribute 'servo_of_mine'"):
+        _ = fivebar_sim.servo_of_mine
+
+
+def test_wheel_says_that_it_has_types() -> None:
+    shipped = {file.distribution_path for file in WheelBuilder(str(ROOT)).recurse_included_files()}
+    assert {"fivebar_sim/py.typed", "fivebar_controllers/py.typed"} <= shipped
 
 
 def test_examples_have_no_deadline_and_repeat_unless_asked_for_others(

@@ -127,6 +127,21 @@ def test_run_of_another_controller_is_read_again(tmp_path: Path) -> None:
         np.testing.assert_array_equal(again.record[name], first.record[name])
 
 
+def test_result_is_read_back_as_it_was(tmp_path: Path, result: Result) -> None:
+    """The text of the scenarios: a directory's path and controller are other objects."""
+    read = Result.read(result.write(tmp_path / "run"))
+    assert read.scenario.table() == result.scenario.table()
+    assert list(read.record) == list(result.record)
+    for name, column in result.record.items():
+        np.testing.assert_array_equal(read.record[name], column)
+    assert read.metrics == result.metrics
+    assert (read.limits, read.verdict) == (result.limits, "fail")
+
+
+def test_repr_of_a_result_is_one_short_line(result: Result) -> None:
+    assert repr(result) == "Result('classic-ellipse': fail, 751 steps)"
+
+
 # edge
 
 
