@@ -6,10 +6,11 @@ Angle pairs are theta = (theta_A, theta_E), torques tau = (tau_A, tau_E), (..., 
 
 F is what the world does to the foot. Weight and motor armature are in; `inverse`, `forward` and
 `step_torques` add the Coulomb friction of the gears, and a torque law may have any other.
+
+`LegDynamics(leg, assembly, payload)` has all functions as methods, for whoever asks more than once.
 """
 
 from fivebar_sim.dynamics.laws import (
-    Energy,
     bias,
     energy,
     forward,
@@ -18,12 +19,14 @@ from fivebar_sim.dynamics.laws import (
     reflected_inertia,
     statics,
 )
+from fivebar_sim.dynamics.leg import Energy, LegDynamics
 from fivebar_sim.dynamics.motion import Law, Motion, integrate, simulate
 from fivebar_sim.dynamics.stepwise import soft_loop, step_torques
 
 __all__ = [
     "Energy",
     "Law",
+    "LegDynamics",
     "Motion",
     "bias",
     "energy",

@@ -1,31 +1,15 @@
-"""What the closed chain's equation of motion says of given poses, rates and torques."""
+"""What the closed chain's equation of motion says of given poses, rates and torques.
+
+Each function is the method of that name of `LegDynamics`, for a single question.
+"""
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
-import numpy as np
 from numpy.typing import ArrayLike
 
-from fivebar_sim import kinematics
-from fivebar_sim.arrays import Array, as_pairs, at, finite, first_index, together
-from fivebar_sim.checks import check_number
-from fivebar_sim.dynamics.chain import Chain, Vector, cross, placed
-from fivebar_sim.errors import SingularError
+from fivebar_sim.arrays import Array
+from fivebar_sim.dynamics.leg import Energy, LegDynamics
 from fivebar_sim.geometry import FiveBar
-from fivebar_sim.kinematics.rates import SINGULAR
-
-
-class Energy(NamedTuple):
-    """The mechanical energy of poses in motion.
-
-    Attributes:
-        kinetic: Of links, payload and rotors [J], (...).
-        potential: Of links and payload, zero if all were at O, the hip frame's origin [J], (...).
-    """
-
-    kinetic: Array
-    potential: Array
 
 
 def inverse(
@@ -64,20 +48,8 @@ def inverse(
         ArgumentError: Shapes that do not broadcast, numbers that are not finite, unknown
             assembly, negative payload or friction.
     """
-    chain = Chain.of(leg, assembly, payload)
-    check_number("friction", friction, "N m", low=0.0)
-    force = (0.0, 0.0) if foot_force is None else foot_force
-    theta, w, alpha, F = _pairs(
-        theta=theta, theta_dot=theta_dot, theta_ddot=theta_ddot, foot_force=force
-    )
-    p = chain.pose(*_split(theta))
-    M_AA, M_AE, M_EE = chain.mass(p)
-    h_A, h_E = chain.bias(p, *_split(w))
-    f_A, f_E = chain.foot_torques(p, _split(F))
-    tau_A = M_AA * alpha[..., 0] + M_AE * alpha[..., 1] + h_A - f_A
-    tau_E = M_AE * alpha[..., 0] + M_EE * alpha[..., 1] + h_E - f_E
-
-    return np.stack([tau_A, tau_E], axis=-1) + friction * np.sign(w)
+    model = LegDynamics(leg, assembly, payload)
+    return model.inverse(theta, theta_dot, theta_ddot, foot_force, friction=friction)
 
 
 def statics(
@@ -101,10 +73,7 @@ def statics(
         SingularError: Where B, C and D are in line.
         ArgumentError: As `inverse`.
     """
-    chain = Chain.of(leg, assembly, 0.0)
-    theta, F = _pairs(theta=theta, foot_force=foot_force)
-    f_A, f_E = chain.foot_torques(chain.pose(*_split(theta)), _split(F))
-    return np.stack([-f_A, -f_E], axis=-1)
+    return LegDynamics(leg, assembly).statics(theta, foot_force)
 
 
 def mass_matrix(
@@ -126,10 +95,7 @@ def mass_matrix(
         SingularError: Where B, C and D are in line: M is infinite.
         ArgumentError: As `inverse`.
     """
-    chain = Chain.of(leg, assembly, payload)
-    (theta,) = _pairs(theta=theta)
-    M_AA, M_AE, M_EE = chain.mass(chain.pose(*_split(theta)))
-    return np.stack([np.stack([M_AA, M_AE], -1), np.stack([M_AE, M_EE], -1)], -2)
+    return LegDynamics(leg, assembly, payload).mass_matrix(theta)
 
 
 def bias(
@@ -159,9 +125,7 @@ def bias(
         SingularError: Where B, C and D are in line.
         ArgumentError: As `inverse`.
     """
-    chain = Chain.of(leg, assembly, payload)
-    theta, w = _pairs(theta=theta, theta_dot=theta_dot)
-    return np.stack(chain.bias(chain.pose(*_split(theta)), *_split(w)), axis=-1)
+    return LegDynamics(leg, assembly, payload).bias(theta, theta_dot)
 
 
 def forward(
@@ -197,13 +161,8 @@ def forward(
         SingularError: Where B, C and D are in line.
         ArgumentError: As `inverse`.
     """
-    chain = Chain.of(leg, assembly, payload)
-    check_number("friction", friction, "N m", low=0.0)
-    force = (0.0, 0.0) if foot_force is None else foot_force
-    theta, w, tau, F = _pairs(theta=theta, theta_dot=theta_dot, tau=tau, foot_force=force)
-    p = chain.pose(*_split(theta))
-    driven = _split(tau - friction * np.sign(w))
-    return np.stack(chain.accelerations(p, _split(w), driven, _split(F)), axis=-1)
+    model = LegDynamics(leg, assembly, payload)
+    return model.forward(theta, theta_dot, tau, foot_force, friction=friction)
 
 
 def energy(
@@ -231,13 +190,7 @@ def energy(
         SingularError: Where B, C and D are in line.
         ArgumentError: As `inverse`.
     """
-    chain = Chain.of(leg, assembly, payload)
-    theta, w = _pairs(theta=theta, theta_dot=theta_dot)
-    p = chain.pose(*_split(theta))
-    w1, w4 = _split(w)
-    rates = w1, p.a2 * w1 + p.b2 * w4, p.a3 * w1 + p.b3 * w4, w4
-    kinetic, potential = chain.energies(p, rates)
-    return Energy(np.asarray(kinetic), np.asarray(potential))
+    return LegDynamics(leg, assembly, payload).energy(theta, theta_dot)
 
 
 def reflected_inertia(
@@ -262,34 +215,4 @@ def reflected_inertia(
         SingularError: Where B, C and D, or A, B and F, or E, D and C are in line.
         ArgumentError: As `inverse`.
     """
-    chain = Chain.of(leg, assembly, payload)
-    (theta,) = _pairs(theta=theta)
-    p = chain.pose(*_split(theta))
-    rho = float(np.hypot(*leg.foot_offset))
-    _refuse(cross(p.e1, placed(p.e2, leg.foot_offset)) / rho, "A, B and F are in line")
-    _refuse(cross(p.e4, p.e3), "E, D and C are in line")
-    M = mass_matrix(leg, theta, assembly=assembly, payload=payload)
-    J_inv = np.linalg.inv(kinematics.jacobian(leg, theta, assembly))
-    product = np.einsum("...ji,...jk,...kl->...il", J_inv, M, J_inv)
-    return 0.5 * (product + np.swapaxes(product, -1, -2))  # they differ by rounding
-
-
-def _pairs(**values: ArrayLike) -> list[Array]:
-    """Return the values as finite pairs of one shape (..., 2); ArgumentError if they are not."""
-    return together(**{name: finite(as_pairs(v, name), name) for name, v in values.items()})
-
-
-def _split(pairs: Array) -> Vector:
-    """Return the two coordinates of pairs, each (...)."""
-    return pairs[..., 0], pairs[..., 1]
-
-
-def _refuse(sine: Array, where: str) -> None:
-    """Raise if the sine of the angle between two links is no more than rounding."""
-    singular = np.logical_not(np.abs(sine) > SINGULAR)
-    if singular.any():
-        index = first_index(singular)
-        count = f"{int(singular.sum())} of {singular.size} poses are" if index else "the pose is"
-        raise SingularError(
-            f"{count} singular: {where}, the foot's inertia is infinite{at(index)}", index
-        )
+    return LegDynamics(leg, assembly, payload).reflected_inertia(theta)

@@ -85,12 +85,27 @@ def simulate(
         ArgumentError: As `inverse`; a timestep or numbers of steps that are not positive, a law
             whose result has the wrong shape.
     """
+    chain = Chain.of(leg, assembly, payload)
+    return simulate_chain(chain, theta, theta_dot, timestep, steps, torque, foot_force, every)
+
+
+def simulate_chain(
+    chain: Chain,
+    theta: ArrayLike,
+    theta_dot: ArrayLike,
+    timestep: float,
+    steps: int,
+    torque: Law | None,
+    foot_force: Law | None,
+    every: int,
+) -> Motion:
+    """Return what `simulate` returns, of a leg's constants."""
     check_number("timestep", timestep, "s", low=0.0, strict=True)
     for name, count in (("steps", steps), ("every", every)):
         if not isinstance(count, (int, np.integer)) or count < 1:
             raise ArgumentError(f"{name} must be a whole number of at least 1, got {count!r}")
     q, w = _start(theta, theta_dot)
-    plant = _Plant(Chain.of(leg, assembly, payload), torque, foot_force)
+    plant = _Plant(chain, torque, foot_force)
     plant.chain.pose(q[..., 0], q[..., 1])  # the errors of a bad start, as themselves
     return _runge_kutta(plant, q, w, timestep, range(0, steps + 1, every), steps)
 
@@ -130,6 +145,21 @@ def integrate(
             the integrator came.
         ArgumentError: As `simulate`; more than one leg, times that do not rise.
     """
+    chain = Chain.of(leg, assembly, payload)
+    return integrate_chain(chain, theta, theta_dot, times, torque, foot_force, rtol, atol)
+
+
+def integrate_chain(
+    chain: Chain,
+    theta: ArrayLike,
+    theta_dot: ArrayLike,
+    times: ArrayLike,
+    torque: Law | None,
+    foot_force: Law | None,
+    rtol: float,
+    atol: float,
+) -> Motion:
+    """Return what `integrate` returns, of a leg's constants."""
     q, w = _start(theta, theta_dot)
     if q.shape != (2,):
         raise ArgumentError(f"theta must be of one leg, (2,), got {q.shape}; see simulate")
@@ -140,7 +170,7 @@ def integrate(
 
     check_number("rtol", rtol, "", low=100 * np.finfo(float).eps, high=1.0)
     check_number("atol", atol, "rad", low=0.0, high=1.0)
-    plant = _Plant(Chain.of(leg, assembly, payload), torque, foot_force)
+    plant = _Plant(chain, torque, foot_force)
     plant.chain.pose(q[0], q[1])
     states = _dop853(plant, np.concatenate([q, w]), t, rtol, atol)
 

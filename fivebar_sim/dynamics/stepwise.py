@@ -58,7 +58,13 @@ def step_torques(
         ArgumentError: Shapes that do not fit, numbers that are not finite, fewer than two rows,
             a timestep that is not positive, negative payload or friction.
     """
-    chain = Chain.of(leg, None, payload)
+    return step_chain(Chain.of(leg, None, payload), q, timestep, foot_force, friction)
+
+
+def step_chain(
+    chain: Chain, q: ArrayLike, timestep: float, foot_force: ArrayLike | None, friction: float
+) -> Array:
+    """Return what `step_torques` returns, of a leg's constants."""
     check_number("friction", friction, "N m", low=0.0)
     steps = _Steps.of(_rows(q), timestep)
     force = _forces((0.0, 0.0) if foot_force is None else foot_force, steps.psi[0].shape)
@@ -110,7 +116,11 @@ def soft_loop(
         DivergedError: Where a link would turn by TURN_MAX in a step.
         ArgumentError: As `step_torques`, or a negative damping.
     """
-    chain = Chain.of(leg, None, payload)
+    return soften(Chain.of(leg, None, payload), q, timestep, damping)
+
+
+def soften(chain: Chain, q: ArrayLike, timestep: float, damping: float) -> Array:
+    """Return what `soft_loop` returns, of a leg's constants."""
     check_number("damping", damping, "N m s/rad", low=0.0)
     q = _rows(q)
     if q.ndim != 2:
