@@ -178,8 +178,10 @@ def test_signal_at_any_moment_ends_the_program(
 ) -> None:
     """Status and output at 75 moments of a run, from when the program listens to its very end."""
     run = ["run", "short.toml", "--quiet", "--out"]
-    command, rng = [sys.executable, "-c", LISTENS, *run], random.Random(1)
-    begun, came = time.monotonic(), Counter[tuple[int, bytes, bool]]()
+    command = [sys.executable, "-c", LISTENS, *run]
+    rng = random.Random(1)
+    begun = time.monotonic()
+    came = Counter[tuple[int, bytes, bool]]()
     subprocess.run([*command, "first"], check=True, stdout=subprocess.DEVNULL)
     takes = time.monotonic() - begun
     for number in range(75):

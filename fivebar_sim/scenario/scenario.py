@@ -197,6 +197,7 @@ class Scenario(msgspec.Struct, frozen=True, kw_only=True):
             tomli_w.dumps(driven.table())
         except TypeError as error:
             raise ConfigError(f"controller {name!r} has a field that is no TOML: {error}") from None
+
         return driven
 
     def table(self) -> Table:
