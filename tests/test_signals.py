@@ -190,8 +190,11 @@ def test_signal_at_any_moment_ends_the_program(
             assert process.stdout is not None
             assert process.stdout.readline() == b"listens\n"
             time.sleep(rng.uniform(0.0, takes))
+            late = process.poll() is not None
             process.send_signal(sent)
             err = process.communicate()[1]
+        # a lost one; Python itself drops a late Ctrl-C, which finds the run written
+        assert process.returncode or late or sent == signal.SIGINT
         if place.exists():
             stored.read(place)
         came[process.returncode, err, place.exists()] += 1
