@@ -13,6 +13,7 @@ from fivebar_controllers.pd import Pd
 from fivebar_sim import rollout
 from fivebar_sim.arrays import Array
 from fivebar_sim.control import Observation, Reference
+from fivebar_sim.control.bus import Bus
 from fivebar_sim.control.interface import Drive
 from fivebar_sim.control.servo import Servo
 from fivebar_sim.errors import ArgumentError, ConfigError, DivergedError, LoopOpenError
@@ -170,9 +171,9 @@ def test_commands_hold_for_a_control_period(every: int) -> None:
 def test_feedback_that_sends_a_plan_is_the_plan(integrator: str) -> None:
     """The same setpoints, asked or planned: the same bits. Planned ones are one step ahead."""
     asked = with_mine(Angles(), f"sim.integrator={integrator}", "servo={rate=200.0, delay=0.003}")
-    table = asked.scenario.servo.sent(
-        asked.motion.q[:-1, [0, 2]], asked.motion.q[0, [0, 2]], asked.motion.timestep
-    )
+    bus = Bus([asked.scenario.servo], "position", timestep=H, steps=asked.scenario.steps)
+    bus.restart(np.arange(1), asked.motion.q[:1, [0, 2]])
+    table = bus.send_all(asked.motion.q[None, :-1, [0, 2]])[0]
     plain = planned(f"sim.integrator={integrator}", "servo={rate=200.0, delay=0.003}")
     known = rollout.execute(plain._replace(setpoints=table)).record
     for name, column in rollout.execute(asked).record.items():

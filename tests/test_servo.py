@@ -14,6 +14,7 @@ from mujoco.batch import Batch
 
 from fivebar_sim import model, motion
 from fivebar_sim.arrays import Array
+from fivebar_sim.control.bus import Bus
 from fivebar_sim.control.servo import Drive, Servo, applied_torque, saturated
 from fivebar_sim.errors import ArgumentError, ConfigError
 from fivebar_sim.files import resources
@@ -200,6 +201,15 @@ def test_commands_arrive_late_and_hold(servo: Servo, timestep: float, count: int
     np.testing.assert_array_equal(row, servo.latched(count + 7, timestep)[:count])  # a growing one
 
 
+def carried(
+    servo: Servo, table: Array, rest: Array, timestep: float, drive: Drive = "position"
+) -> Array:
+    """Return what acts in each step of a command a step, (nsim, N, 2)."""
+    bus = Bus([servo] * len(table), drive, timestep=timestep, steps=table.shape[1])
+    bus.restart(np.arange(len(table)), rest)
+    return bus.send_all(table)
+
+
 @given(servo=BUSES, timestep=TIMESTEPS, seed=st.integers(0, 99), k=st.integers(0, 79))
 def test_what_is_sent_is_causal(servo: Servo, timestep: float, seed: int, k: int) -> None:
     rng = np.random.default_rng(seed)
@@ -207,11 +217,12 @@ def test_what_is_sent_is_causal(servo: Servo, timestep: float, seed: int, k: int
     rest = rng.standard_normal((3, 2))
     changed = table.copy()
     changed[:, k] += 1.0
-    one, other = (servo.sent(each, rest, timestep) for each in (table, changed))
+    one = carried(servo, table, rest, timestep)
+    other = carried(servo, changed, rest, timestep)
     assert one.shape == table.shape
     np.testing.assert_array_equal(one[:, :k], other[:, :k])
-    np.testing.assert_array_equal(one[1], servo.sent(table[1], rest[1], timestep))
-    raw = servo.sent(table, rest, timestep, "torque")
+    np.testing.assert_array_equal(one[1], carried(servo, table[1:2], rest[1:2], timestep)[0])
+    raw = carried(servo, table, rest, timestep, "torque")
     row = servo.latched(80, timestep)
     np.testing.assert_array_equal(one, servo.rounded(raw))  # torques are not
     for j in range(80):
@@ -228,8 +239,8 @@ def test_rounding_is_to_the_nearest_whole_step(theta: float, resolution: float) 
 
 
 def test_ideal_and_extreme_buses() -> None:
-    table = np.random.default_rng(1).standard_normal((5, 2))
-    np.testing.assert_array_equal(Servo().sent(table, np.zeros(2), H), table)
+    table = np.random.default_rng(1).standard_normal((1, 5, 2))
+    np.testing.assert_array_equal(carried(Servo(), table, np.zeros((1, 2)), H), table)
     np.testing.assert_array_equal(Servo(rate=1.0 / 3e-3).latched(4, 3e-3), [0, 1, 2, 3])
     assert Servo(delay=1e300).latched(3, 1e-300).tolist() == [-1, -1, -1]
     assert Servo(rate=5e-324).latched(3, 1e-3).tolist() == [0, 0, 0]

@@ -133,25 +133,6 @@ class Servo(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
         step = self.resolution
         return step * np.round(theta / step) if step > 0.0 else theta
 
-    def sent(self, table: Array, rest: Array, timestep: float, drive: Drive = "position") -> Array:
-        """Return what the servos really get of a table of commands, in each step.
-
-        Args:
-            table: Commands as they are computed, row k in step k [rad or N m], (..., N, 2).
-            rest: What acts until the first command comes [rad or N m], (..., 2).
-            timestep: h [s].
-            drive: What the commands are; torques are not rounded.
-
-        Returns:
-            Commands that act [rad or N m], (..., N, 2); row k depends on no later row.
-
-        Raises:
-            ArgumentError: See `latched`.
-        """
-        row = self.latched(table.shape[-2], timestep)
-        acting = np.where(row[:, None] < 0, rest[..., None, :], table[..., np.maximum(row, 0), :])
-        return self.rounded(acting) if drive == "position" else acting
-
 
 @dataclass(frozen=True, slots=True)
 class ServoArrays:

@@ -10,6 +10,7 @@ import numpy as np
 from fivebar_sim import model, motion
 from fivebar_sim.arrays import Array
 from fivebar_sim.control import Feedback, Setpoints
+from fivebar_sim.control.bus import Bus
 from fivebar_sim.control.step import whole_steps
 from fivebar_sim.errors import ConfigError, FiveBarError
 from fivebar_sim.motion import Motion
@@ -128,7 +129,9 @@ def _setpoints(scenario: Scenario, controller: Setpoints, wanted: Motion) -> Arr
             f"got {ctrl.dtype} of shape {ctrl.shape}"
         )
 
-    return scenario.servo.sent(ctrl.astype(np.float64), wanted.q[0, ::2], scenario.sim.timestep)
+    bus = Bus([scenario.servo], "position", timestep=scenario.sim.timestep, steps=scenario.steps)
+    bus.restart(np.arange(1), wanted.q[:1, ::2])
+    return bus.send_all(ctrl[None].astype(np.float64))[0]
 
 
 def period_steps(plan: Plan) -> int:
