@@ -134,7 +134,7 @@ def test_angles_alone_are_as_noisy_without_noisy_rates() -> None:
     drive=st.sampled_from(["position", "torque"]),
 )
 def test_commands_arrive_as_the_servo_says(every: int, hold: int, late: int, drive: Drive) -> None:
-    """What arrives is `Servo.sent` of a table whose rows hold for a control period."""
+    """What arrives is the row that `Servo.latched` names, of rows that hold for a period."""
     steps = 40
     servo = Servo(rate=1.0 / (hold * H), delay=late * H, resolution=0.02)
     control = step(servo=servo, drive=drive, every=every, steps=steps, seeds=(0, 1))
@@ -144,7 +144,10 @@ def test_commands_arrive_as_the_servo_says(every: int, hold: int, late: int, dri
     table = np.repeat(commands, every, axis=1)[:, :steps]
     ours = sent(control, commands, every)
     assert ours.shape == (2, steps, 2)
-    np.testing.assert_array_equal(ours, servo.sent(table, rest, H, drive))
+    row = servo.latched(steps, H)
+    acting = np.where(row[:, None] < 0, rest[:, None], table[:, np.maximum(row, 0)])
+    expected = servo.rounded(acting) if drive == "position" else acting
+    np.testing.assert_array_equal(ours, expected)
 
 
 def test_torque_is_not_rounded_and_makes_up_for_the_back_emf() -> None:

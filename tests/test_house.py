@@ -51,6 +51,8 @@ PURE = (
     "scenario.scenes",
     "control.sensors",
     "control.servo",
+    "control.bus",
+    "control.noise",
     "control.step",
     "tasks",
     "tasks.episodes",

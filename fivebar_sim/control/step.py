@@ -13,16 +13,12 @@ from numpy.typing import NDArray
 
 from fivebar_sim.arrays import Array
 from fivebar_sim.checks import LARGEST, check_number
-from fivebar_sim.control.interface import Drive, Observation
+from fivebar_sim.control.bus import Bus, Steps
+from fivebar_sim.control.interface import Observation
+from fivebar_sim.control.noise import Noise
 from fivebar_sim.control.sensors import Sensors
-from fivebar_sim.control.servo import Servo, ServoArrays
+from fivebar_sim.control.servo import Drive, Servo, ServoArrays
 from fivebar_sim.errors import ArgumentError
-
-DRAWN = 64
-"""Control steps whose noise is drawn in one go; the numbers are those of one by one."""
-
-Steps = int | NDArray[np.int64]
-"""A step that all legs are at, or that of each leg, (nsim,)."""
 
 
 def whole_steps(name: str, seconds: float, timestep: float) -> int:
@@ -71,30 +67,19 @@ class ControlStep:
     ) -> None:
         nsim = len(start)
         servos = [servo] * nsim if isinstance(servo, Servo) else list(servo)
-        self.every = every
         ServoArrays.of(servos)  # refuses servos that differ in more than gains and bus
-        self._servo = servos[0]  # of which only what all have in common is used
+        self.every = every
+        self._back_emf = servos[0].back_emf
         self._sensors = sensors
         self._drive = drive
         self._h = timestep
         late = round(min(sensors.delay / timestep, steps))  # later, only the start would be seen
         self._theta = np.empty((nsim, late + 1, 2))
         self._theta_dot = np.zeros_like(self._theta)
-        self._noisy = sensors.noise > 0.0 or sensors.rate_noise > 0.0
-        self._noise = [np.random.default_rng(0)] * nsim
-        self._drawn = np.empty((nsim, DRAWN if self._noisy else 0, 2, 2))
-        self._used = np.zeros(nsim, dtype=np.int64)
-        self._legs = np.arange(nsim)
-
-        buses = list(dict.fromkeys((s.rate, s.delay) for s in servos))
-        self._bus = np.array([buses.index((s.rate, s.delay)) for s in servos])
-        firsts = [next(s for s in servos if (s.rate, s.delay) == bus) for bus in buses]
-        self._latched = np.stack([s.latched(steps, timestep) for s in firsts])
-        age = np.arange(steps) // every - self._latched // every
-        self._depth = 1 + int(age.max(initial=0, where=self._latched >= 0))
-        self._prompt = self._depth == 1 and bool((self._latched >= 0).all())
-        self._commands = np.empty((nsim, self._depth + 1, 2))  # the last: before one has arrived
-        self.restart(self._legs, start, seeds)
+        noisy = sensors.noise > 0.0 or sensors.rate_noise > 0.0
+        self._noise = Noise(nsim) if noisy else None
+        self._bus = Bus(servos, drive, timestep=timestep, steps=steps, every=every)
+        self.restart(np.arange(nsim), start, seeds)
 
     def restart(self, rows: NDArray[np.int64], start: Array, seeds: Sequence[int]) -> None:
         """Put some legs back to step 0.
@@ -106,11 +91,9 @@ class ControlStep:
         """
         self._theta[rows] = start[:, None]
         self._theta_dot[rows] = 0.0
-        self._commands[rows, -1] = start if self._drive == "position" else 0.0
-        if self._noisy:
-            for row, seed in zip(rows.tolist(), seeds, strict=True):
-                self._noise[row] = np.random.default_rng(seed)
-            self._used[rows] = DRAWN
+        self._bus.restart(rows, start if self._drive == "position" else np.zeros_like(start))
+        if self._noise is not None:
+            self._noise.restart(rows, seeds)
 
     def moved(self, theta: Array, theta_dot: Array) -> None:
         """Take note of the motor angles [rad] and rates [rad/s] of the last steps, (nsim, n, 2)."""
@@ -123,22 +106,13 @@ class ControlStep:
         time = cast(float, k * self._h)
         theta = self._theta[:, 0]
         theta_dot = self._theta_dot[:, 0]
-        if self._noisy:
-            drawn = self._draw()
+        if self._noise is not None:
+            drawn = self._noise.draw()
             theta = theta + sensors.noise * drawn[:, 0]
             theta_dot = theta_dot + sensors.rate_noise * drawn[:, 1]
         if sensors.resolution > 0.0:
             theta = np.round(theta / sensors.resolution) * sensors.resolution
         return Observation(time, theta, theta_dot)
-
-    def _draw(self) -> Array:
-        """Return the next numbers of each leg's noise, (nsim, 2, 2)."""
-        for row in np.flatnonzero(self._used == DRAWN).tolist():
-            self._drawn[row] = self._noise[row].standard_normal((DRAWN, 2, 2))
-            self._used[row] = 0
-        drawn = self._drawn[self._legs, self._used]
-        self._used += 1
-        return drawn
 
     def send(self, k: Steps, command: Array) -> Array:
         """Return what reaches the motors in each step until the next control step, (nsim, n, 2).
@@ -150,21 +124,10 @@ class ControlStep:
             k: The step.
             command: (A, E) [rad or N m], (nsim, 2).
         """
-        sent = self._arriving(k, command)
+        sent = self._bus.send(k, command)
         if self._drive == "position":
-            return self._servo.rounded(sent)
-        return sent + self._servo.back_emf * self._theta_dot[:, -1:]
-
-    def _arriving(self, k: Steps, command: Array) -> Array:
-        """Return the commands that have come over the bus, after the newest is sent, as `send`."""
-        n = min(self.every, self._latched.shape[1] - int(np.max(k)))
-        if self._prompt:
-            return np.repeat(command[:, None], n, axis=1)
-        at = np.broadcast_to(k, len(command))
-        self._commands[self._legs, at // self.every % self._depth] = command
-        row = self._latched[self._bus[:, None], at[:, None] + np.arange(n)]
-        slot = np.where(row < 0, self._depth, row // self.every % self._depth)
-        return self._commands[self._legs[:, None], slot]
+            return sent
+        return sent + self._back_emf * self._theta_dot[:, -1:]
 
 
 def _last(before: Array, new: Array) -> Array:

@@ -1,0 +1,45 @@
+"""White noise of some legs, each with a seed of its own."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fivebar_sim.arrays import Array
+
+DRAWN = 64
+"""Control steps whose noise is drawn in one go; the numbers are those of one by one."""
+
+
+class Noise:
+    """Normal numbers of variance 1 for the angles and rates of legs.
+
+    A leg's numbers depend on its seed alone, not on the legs beside it.
+
+    Args:
+        nsim: Number of legs.
+    """
+
+    def __init__(self, nsim: int) -> None:
+        self._random = [np.random.default_rng(0)] * nsim
+        self._drawn = np.empty((nsim, DRAWN, 2, 2))
+        self._used = np.full(nsim, DRAWN)
+        self._legs = np.arange(nsim)
+
+    def restart(self, rows: NDArray[np.int64], seeds: Sequence[int]) -> None:
+        """Begin the numbers of some legs anew, from a seed each."""
+        for row, seed in zip(rows.tolist(), seeds, strict=True):
+            self._random[row] = np.random.default_rng(seed)
+        self._used[rows] = DRAWN
+
+    def draw(self) -> Array:
+        """Return the next numbers of each leg, (nsim, 2, 2): of A and E, angles then rates."""
+        for row in np.flatnonzero(self._used == DRAWN).tolist():
+            self._drawn[row] = self._random[row].standard_normal((DRAWN, 2, 2))
+            self._used[row] = 0
+
+        drawn = self._drawn[self._legs, self._used]
+        self._used += 1
+        return drawn
