@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from importlib.metadata import EntryPoint, entry_points
 from typing import Any, ClassVar, NamedTuple, Protocol, runtime_checkable
 
 import msgspec
+import numpy as np
+from numpy.typing import NDArray
 
 from fivebar_sim.arrays import Array
 from fivebar_sim.control.servo import Drive, Servo
-from fivebar_sim.errors import ConfigError, unknown
+from fivebar_sim.errors import ConfigError, FiveBarError, unknown
 from fivebar_sim.geometry import FiveBar
 from fivebar_sim.integrator import Integrator
 from fivebar_sim.motion import Motion
@@ -132,6 +135,29 @@ def find(name: str) -> type[Any]:
         )
 
     return kind
+
+
+def answer_of(name: str, ask: Callable[[], Array]) -> NDArray[Any]:
+    """Return what a controller answers, as an array of whatever it is.
+
+    Args:
+        name: The controller's, for the message.
+        ask: Calls the controller.
+
+    Raises:
+        ConfigError: It fails with anything but an error of this package, which passes.
+    """
+    try:
+        return np.asarray(ask())
+    except FiveBarError:
+        raise
+    except Exception as error:  # a user's code may raise anything
+        raise ConfigError(f"controller {name!r} failed: {type(error).__name__}: {error}") from error
+
+
+def is_numbers(answer: NDArray[Any], shape: tuple[int, ...]) -> bool:
+    """Return whether a controller's answer is real numbers, bools not among them, of a shape."""
+    return answer.dtype.kind in "fiu" and answer.shape == shape
 
 
 def name_of(controller: object) -> str:

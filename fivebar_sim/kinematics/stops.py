@@ -1,4 +1,4 @@
-"""How far the joints may turn: what keeps a leg in its assembly mode."""
+"""How far and how fast the joints may turn."""
 
 from __future__ import annotations
 
@@ -11,6 +11,9 @@ C_STOP = float(np.radians(2.0))
 
 MOTOR_RANGE = 2.0 * np.pi
 """How far the motors turn to either side of theta = 0 [rad]."""
+
+SPEED_LIMIT = 1e4
+"""Joint rate beyond which a simulation has broken down [rad/s]: a hundred thousand rpm."""
 
 
 def angle_at_C(q: Array) -> Array:

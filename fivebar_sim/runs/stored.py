@@ -13,7 +13,7 @@ from fivebar_sim.metrics import load
 from fivebar_sim.metrics.columns import JOINT_COLUMNS, Record
 from fivebar_sim.scenario import Scenario
 from fivebar_sim.scenario.scenes import Ground, Treadmill
-from fivebar_sim.simulation.steps import SPEED_LIMIT
+from fivebar_sim.kinematics.stops import SPEED_LIMIT
 
 COLUMNS = (
     *("time", "target_x", "target_z", "foot_x", "foot_z"),

@@ -9,8 +9,9 @@ import numpy as np
 
 from fivebar_sim.arrays import Array
 from fivebar_sim.control import Feedback, Reference
+from fivebar_sim.control.interface import answer_of, is_numbers
 from fivebar_sim.control.step import ControlStep
-from fivebar_sim.errors import ConfigError, DivergedError, FiveBarError, PoseError
+from fivebar_sim.errors import ConfigError, DivergedError, PoseError
 from fivebar_sim.motion import Motion
 from fivebar_sim.simulation.plan import Plan, period_steps
 from fivebar_sim.simulation.record import broken
@@ -141,20 +142,13 @@ def _command(group: _Group, k: int) -> Array:
     shape = (len(group.rows), 2)
     arrays = [field[:, k] for field in group.wanted[:-1]]
     wanted = Reference(*arrays, payload=group.wanted.payload)
-    name = f"controller {s.controller_name!r}"
-
-    try:
-        answer = group.controller.command(s.leg, s.servo, group.step.observe(k), wanted)
-    except FiveBarError:
-        raise
-    except Exception as error:  # a user's code may raise anything
-        raise ConfigError(f"{name} failed: {type(error).__name__}: {error}") from error
-
-    command = np.asarray(answer)
-    if command.dtype.kind not in "fiu" or command.shape != shape:
+    name = s.controller_name
+    seen = group.step.observe(k)
+    command = answer_of(name, lambda: group.controller.command(s.leg, s.servo, seen, wanted))
+    if not is_numbers(command, shape):
         raise ConfigError(
-            f"{name} must command numbers of shape {shape}, got {command.dtype} of shape "
-            f"{command.shape}"
+            f"controller {name!r} must command numbers of shape {shape}, "
+            f"got {command.dtype} of shape {command.shape}"
         )
 
     bad = ~np.isfinite(command).all(axis=1)

@@ -11,8 +11,9 @@ from fivebar_sim import model, motion
 from fivebar_sim.arrays import Array
 from fivebar_sim.control import Feedback, Setpoints
 from fivebar_sim.control.bus import Bus
+from fivebar_sim.control.interface import answer_of, is_numbers
 from fivebar_sim.control.step import whole_steps
-from fivebar_sim.errors import ConfigError, FiveBarError
+from fivebar_sim.errors import ConfigError
 from fivebar_sim.motion import Motion
 from fivebar_sim.scenario import Scenario
 from fivebar_sim.scenario.scenes import Ground, Payload
@@ -111,21 +112,15 @@ def _above_ground(scenario: Scenario, scene: Ground, q: Array) -> Array:
 
 def _setpoints(scenario: Scenario, controller: Setpoints, wanted: Motion) -> Array:
     """Return the setpoints that the scenario's controller plans, checked, as they arrive."""
-    name = f"controller {scenario.controller_name!r}"
+    name = scenario.controller_name
     shape = (scenario.steps, 2)
-    try:
-        planned = controller.setpoints(
-            scenario.leg, scenario.servo, wanted, scenario.sim.integrator
-        )
-    except FiveBarError:
-        raise
-    except Exception as error:  # a user's code may raise anything
-        raise ConfigError(f"{name} failed: {type(error).__name__}: {error}") from error
-
-    ctrl = np.asarray(planned)
-    if ctrl.dtype.kind not in "fiu" or ctrl.shape != shape or not np.isfinite(ctrl).all():
+    integrator = scenario.sim.integrator
+    ctrl = answer_of(
+        name, lambda: controller.setpoints(scenario.leg, scenario.servo, wanted, integrator)
+    )
+    if not is_numbers(ctrl, shape) or not np.isfinite(ctrl).all():
         raise ConfigError(
-            f"{name} must plan finite setpoints [rad] of shape {shape}, "
+            f"controller {name!r} must plan finite setpoints [rad] of shape {shape}, "
             f"got {ctrl.dtype} of shape {ctrl.shape}"
         )
 

@@ -12,6 +12,7 @@ from mujoco.batch import Batch
 
 from fivebar_sim.arrays import Array, Bools
 from fivebar_sim.errors import ArgumentError, DivergedError
+from fivebar_sim.kinematics.stops import SPEED_LIMIT
 from fivebar_sim.model import quiet
 
 STATE = mujoco.mjtState.mjSTATE_FULLPHYSICS | mujoco.mjtState.mjSTATE_CTRL
@@ -232,10 +233,6 @@ def simulate_asking(
             shown = k
             last = time.monotonic()
     return states.part(slice(k))
-
-
-SPEED_LIMIT = 1e4
-"""Joint rate beyond which a simulation has broken down [rad/s]: a hundred thousand rpm."""
 
 
 def check(states: States, timestep: float) -> None:

@@ -17,14 +17,12 @@ from fivebar_sim.control.servo import ServoArrays, applied_torque
 from fivebar_sim.control.step import ControlStep
 from fivebar_sim.errors import ArgumentError
 from fivebar_sim.kinematics.leg_arrays import LegArrays
+from fivebar_sim.kinematics.stops import SPEED_LIMIT
 from fivebar_sim.tasks.base import Part, Task
 from fivebar_sim.tasks.motion import TIME, motion
 
 MOTORS = [-4, -2]
 """Where qpos and qvel have A and E."""
-
-SPEED_LIMIT = 1e4
-"""Joint rate beyond which the physics has broken down [rad/s], as in `simulate`."""
 
 
 class Outcome(NamedTuple):
