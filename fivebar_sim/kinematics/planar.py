@@ -18,6 +18,18 @@ def perp(v: Array) -> Array:
     return np.stack([-v[..., 1], v[..., 0]], axis=-1)
 
 
+def end_velocity(AB: Array, BF: Array, psi_1_dot: Array, psi_2_dot: Array) -> Array:
+    """Return F_dot = perp(AB) psi_1_dot + perp(BF) psi_2_dot of two links, A fixed, (..., 2).
+
+    Args:
+        AB: Along the first link, (..., 2).
+        BF: From its end to F, along with the second link, (..., 2).
+        psi_1_dot: Rate of the first link's direction [rad/s], (...).
+        psi_2_dot: Rate of the second link's direction [rad/s], (...).
+    """
+    return perp(AB) * psi_1_dot[..., None] + perp(BF) * psi_2_dot[..., None]
+
+
 def cross(a: Array, b: Array) -> Array:
     """Return a_x b_z - a_z b_x, shape (...)."""
     return a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]

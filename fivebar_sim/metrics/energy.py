@@ -22,6 +22,7 @@ from fivebar_sim import kinematics
 from fivebar_sim.arrays import Array
 from fivebar_sim.dynamics.chain import Chain, Pose, Vector, placed
 from fivebar_sim.geometry import FiveBar
+from fivebar_sim.kinematics.planar import end_velocity
 from fivebar_sim.metrics.columns import JOINTS
 from fivebar_sim.metrics.ground import contact_radius
 
@@ -240,11 +241,9 @@ def foot_rates(leg: FiveBar, q: Array, v: Array) -> Array:
     """
     psi_1 = q[..., 0]
     psi_2 = q[..., 0] + q[..., 1]
-    w1 = v[..., 0]
-    w2 = v[..., 0] + v[..., 1]
-    AB = leg.L1 * np.cos(psi_1), leg.L1 * np.sin(psi_1)
-    BF = placed((np.cos(psi_2), np.sin(psi_2)), leg.foot_offset)
-    return np.stack([-AB[1] * w1 - BF[1] * w2, AB[0] * w1 + BF[0] * w2], axis=-1)
+    AB = np.stack([leg.L1 * np.cos(psi_1), leg.L1 * np.sin(psi_1)], axis=-1)
+    BF = np.stack(placed((np.cos(psi_2), np.sin(psi_2)), leg.foot_offset), axis=-1)
+    return end_velocity(AB, BF, v[..., 0], v[..., 0] + v[..., 1])
 
 
 def measure(found: Balance) -> dict[str, Any]:

@@ -11,7 +11,7 @@ from fivebar_sim import kinematics
 from fivebar_sim.arrays import Array, Bools
 from fivebar_sim.geometry import FiveBar
 from fivebar_sim.kinematics.leg_arrays import LegArrays
-from fivebar_sim.kinematics.planar import perp
+from fivebar_sim.kinematics.planar import end_velocity
 from fivebar_sim.kinematics.stops import C_STOP, MOTOR_RANGE, angle_at_C
 
 REASONS = np.array(["", "broken", "gap", "flip", "limit", "time"])
@@ -77,7 +77,7 @@ def motion(
     q_dot = qvel[:, -4:]
     p = kinematics.chain_points(leg, q)
     A, _ = kinematics.bases(leg)
-    foot_dot = perp(p.B - A) * q_dot[:, :1] + perp(p.F - p.B) * (q_dot[:, :1] + q_dot[:, 1:2])
+    foot_dot = end_velocity(p.B - A, p.F - p.B, q_dot[:, 0], q_dot[:, 0] + q_dot[:, 1])
     hip = np.concatenate([qpos[:, :-4], qvel[:, :-4]], axis=1)
     height = np.full(len(q), np.inf)
 
