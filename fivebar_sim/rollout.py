@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import groupby
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -66,6 +65,36 @@ class Result(NamedTuple):
         return directory.write(self, Path(path))
 
 
+class Kind(NamedTuple):
+    """What plans have in common that are simulated together.
+
+    Attributes:
+        timestep: h [s].
+        steps: Timesteps of the run.
+        scene: The scene's kind.
+        extended: Whether the leg has an extension, so that its model has a geom more.
+        period: Timesteps of the control period; None where all commands are known before.
+    """
+
+    timestep: float
+    steps: int
+    scene: str
+    extended: bool
+    period: int | None
+
+    @classmethod
+    def of(cls, planned: Plan) -> Kind:
+        """Return the kind of a plan."""
+        scenario = planned.scenario
+        return cls(
+            timestep=planned.motion.timestep,
+            steps=scenario.steps,
+            scene=scenario.scene.kind,
+            extended=scenario.leg.L6 > 0.0,
+            period=period_steps(planned) if planned.setpoints is None else None,
+        )
+
+
 def run(scenario: Scenario) -> Result:
     """Return the result of one scenario.
 
@@ -98,19 +127,13 @@ def run_all(plans: Sequence[Plan], nthread: int = 1) -> list[Result]:
     Raises:
         DivergedError: A simulation broke down; says which, and when.
     """
+    groups: dict[Kind, list[int]] = {}
+    for i, planned in enumerate(plans):
+        groups.setdefault(Kind.of(planned), []).append(i)
+
     results: dict[int, Result] = {}
-
-    def alike(index: int) -> tuple[float, int, str, int, int]:
-        planned = plans[index]
-        scenario = plans[index].scenario
-        asked = 0 if planned.setpoints is not None else period_steps(planned)
-        structure = scenario.scene.kind, planned.model.ngeom  # a leg with L6 has a geom more
-        return planned.motion.timestep, scenario.steps, *structure, asked
-
-    for _, group in groupby(sorted(range(len(plans)), key=alike), key=alike):
-        members = list(group)
-        chosen = [plans[i] for i in members]
-        states = _simulated(chosen, nthread)
+    for members in groups.values():
+        states = _simulated([plans[i] for i in members], nthread)
         for row, i in enumerate(members):
             results[i] = _result(plans[i], states.rows(slice(row, row + 1)))
     return [results[i] for i in range(len(plans))]
