@@ -1,0 +1,129 @@
+"""A leg as dm_control's physics and task; import it after `gl.settle()`."""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from typing import Any
+
+import mujoco
+import numpy as np
+from dm_control.mujoco import Physics
+from dm_control.rl import control
+from dm_env import specs
+
+from fivebar_sim.arrays import Array
+from fivebar_sim.model import quiet
+from fivebar_sim.tasks import REASONS
+from fivebar_sim.tasks.episodes import Episodes, Outcome
+
+
+class LegPhysics(Physics):
+    """A leg; its commands of every step are set before `step`, and its states kept after it.
+
+    Attributes:
+        ctrl: Of the next steps, (n, nu).
+        qpos, qvel: After each of the last steps, (n, nq).
+    """
+
+    legacy_step = False
+
+    ctrl: Array
+    qpos: Array
+    qvel: Array
+
+    def step(self, nstep: int = 1) -> None:
+        """Advance by steps, each with its row of ctrl, the last row repeated."""
+        model = self.model.ptr
+        data = self.data.ptr
+        self.qpos = np.empty((nstep, model.nq))
+        self.qvel = np.empty((nstep, model.nv))
+        with quiet():
+            for k in range(nstep):
+                data.ctrl[:] = self.ctrl[min(k, len(self.ctrl) - 1)]
+                mujoco.mj_step(model, data)
+                self.qpos[k] = data.qpos
+                self.qvel[k] = data.qvel
+
+    @property
+    def warnings(self) -> int:
+        """MuJoCo's, since the reset."""
+        return int(self.data.ptr.warning.number.sum())
+
+
+class LegTask(control.Task):
+    """A `Task` as dm_control asks for it.
+
+    Args:
+        episodes: Of one leg.
+        random: What starts and noise are drawn from.
+
+    Attributes:
+        episodes: What has become of the leg.
+        outcome: The last one, with its reward terms.
+    """
+
+    outcome: Outcome
+
+    def __init__(self, episodes: Episodes, random: np.random.Generator) -> None:
+        self.episodes = episodes
+        self._random = random
+        self._names = list(episodes.task.parts)
+        sizes = [part.size for part in episodes.task.parts.values()]
+        self._cuts = np.cumsum(sizes)[:-1]
+
+    def initialize_episode(self, physics: LegPhysics) -> None:
+        """Put the leg at rest near the start of its path."""
+        physics.data.qpos[:] = self.episodes.begin(np.zeros(1, dtype=np.int64), [self._random])[0]
+        self.outcome = self.episodes.outcome()
+
+    def before_step(self, action: Any, physics: LegPhysics) -> None:
+        """Set the commands of the control period.
+
+        Raises:
+            ArgumentError: An action that does not conform to the action spec.
+        """
+        values = self.episodes.checked(action, self.episodes.low.shape)
+        physics.ctrl = self.episodes.commands(values[None])[0]
+
+    def after_step(self, physics: LegPhysics) -> None:
+        """Take note of the period's states."""
+        warnings = np.array([physics.warnings])
+        self.episodes.moved(physics.qpos[None], physics.qvel[None], warnings)
+        self.outcome = self.episodes.outcome()
+
+    def action_spec(self, physics: LegPhysics) -> Any:
+        """Return the shape and the bounds of actions; the name says their parts."""
+        low = self.episodes.low
+        high = self.episodes.high
+        name = "\t".join(f"{name}_{motor}" for name in self.episodes.task.actions for motor in "AE")
+        return specs.BoundedArray(low.shape, np.float64, low, high, name)
+
+    def observation_spec(self, physics: LegPhysics) -> OrderedDict[str, specs.Array]:
+        """Return the shapes of the observation's parts."""
+        parts = self.episodes.task.parts.items()
+        return OrderedDict((n, specs.Array((p.size,), np.float64, n)) for n, p in parts)
+
+    def get_observation(self, physics: LegPhysics) -> Any:
+        """Return the observation's parts by name."""
+        pieces = np.split(self.outcome.observation[0], self._cuts)
+        return OrderedDict(zip(self._names, pieces, strict=True))
+
+    def get_reward(self, physics: LegPhysics) -> Any:
+        """Return the weighted sum of the reward terms."""
+        return float(self.outcome.reward[0])
+
+    def get_termination(self, physics: LegPhysics) -> Any:
+        """Return the discount at an end, 0 unless it is the duration's, and None before."""
+        if self.outcome.truncated[0]:
+            return 1.0
+        return 0.0 if self.outcome.terminated[0] else None
+
+    @property
+    def terms(self) -> dict[str, float]:
+        """The reward terms of the last control period, by name."""
+        return {name: float(term[0]) for name, term in self.outcome.terms.items()}
+
+    @property
+    def reason(self) -> str:
+        """Why the episode is over: limit, flip, gap, broken, time; "" while it is not."""
+        return str(REASONS[self.outcome.reason[0]])
