@@ -7,6 +7,7 @@ an environment. Importing this starts nothing: dm_control is imported by `load`.
 from __future__ import annotations
 
 from pathlib import Path
+from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -52,32 +53,30 @@ def load(
         UnreachableError: The leg cannot follow the path.
         ModuleNotFoundError: dm-control is not installed.
     """
-    gl.settle()  # before dm_control loads OpenGL
-    try:
-        from dm_control.mujoco.wrapper import MjModel
-        from dm_control.rl import control
-    except ModuleNotFoundError as error:
-        raise ModuleNotFoundError(
-            f"fivebar_sim.environment needs dm-control ({error}): "
-            "pip install 'fivebar-sim[control]' on Python 3.11 or 3.12; newer ones have no wheel",
-            name=error.name,
-        ) from error
-
-    from fivebar_sim.tasks.dm_leg import LegPhysics, LegTask
-
+    dm_leg = _dm_leg()
     if seed is not None and not (is_finite(seed) and seed >= 0 and seed == int(seed)):
         raise ArgumentError(f"seed must be a whole number in [0, inf), got {seed!r}")
 
     named = options if leg is None else {"leg": leg, **options}
     wanted = tasks.task(task, **named).resolved()
     drawn, models, starts = prepared(wanted, [model_seed], randomise)
-    physics = LegPhysics.from_model(MjModel(models[0]))
-    episodes = Episodes(wanted, drawn, starts)
-
-    return control.Environment(
-        physics,
-        LegTask(episodes, np.random.default_rng(seed)),
-        n_sub_steps=wanted.every,
+    return dm_leg.environment(
+        models[0],
+        Episodes(wanted, drawn, starts),
+        np.random.default_rng(seed),
         flat_observation=flat_observation,
-        legacy_step=False,
     )
+
+
+def _dm_leg() -> ModuleType:
+    """Return the module that needs dm_control, with a GL chosen before that loads OpenGL."""
+    gl.settle()
+    try:
+        from fivebar_sim.tasks import dm_leg
+    except ModuleNotFoundError as error:
+        raise ModuleNotFoundError(
+            f"fivebar_sim.environment needs dm-control ({error}): "
+            "pip install 'fivebar-sim[control]' on Python 3.11 or 3.12; newer ones have no wheel",
+            name=error.name,
+        ) from error
+    return dm_leg

@@ -8,6 +8,7 @@ from typing import Any
 import mujoco
 import numpy as np
 from dm_control.mujoco import Physics
+from dm_control.mujoco.wrapper import MjModel
 from dm_control.rl import control
 from dm_env import specs
 
@@ -127,3 +128,20 @@ class LegTask(control.Task):
     def reason(self) -> str:
         """Why the episode is over: limit, flip, gap, broken, time; "" while it is not."""
         return str(REASONS[self.outcome.reason[0]])
+
+
+def environment(
+    model: mujoco.MjModel,
+    episodes: Episodes,
+    random: np.random.Generator,
+    *,
+    flat_observation: bool,
+) -> control.Environment:
+    """Return the environment of a leg's model and its episodes."""
+    return control.Environment(
+        LegPhysics.from_model(MjModel(model)),
+        LegTask(episodes, random),
+        n_sub_steps=episodes.task.every,
+        flat_observation=flat_observation,
+        legacy_step=False,
+    )
