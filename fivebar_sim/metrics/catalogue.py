@@ -1,15 +1,27 @@
-"""The metrics of a run: one row each, with what it is called and how far it may move."""
+"""The metrics of a run: one row each, with what it is called and how far it may move.
+
+A new metric is a row here and the function that the row names; nothing else lists metrics.
+"""
 
 from __future__ import annotations
 
-from typing import NamedTuple
+import math
+from collections.abc import Callable, Mapping
+from typing import Any, NamedTuple
+
+from fivebar_sim.arrays import Array
+from fivebar_sim.geometry import FiveBar
+from fivebar_sim.metrics import closure, tracking
+
+Function = Callable[[FiveBar, Mapping[str, Array], slice], float | None]
+"""Takes the leg, the record and the rows of the measured window; None is undefined."""
 
 
 class Metric(NamedTuple):
     """One metric.
 
     Attributes:
-        key: Its dotted key in metrics.json, in SI units.
+        key: Its dotted key in metrics.json, in SI units; "table.name" of a row with a function.
         label: What people call it.
         scale: The factor from SI to the shown unit.
         unit: The shown unit.
@@ -19,6 +31,10 @@ class Metric(NamedTuple):
             torque over a whole run, or another share of it, is not what the leg needs for its
             path, until someone says so.
         detail: Shown only where it has a limit.
+        hidden_at_zero: Shown only where it has a limit or is not 0.
+        function: Measures it. None where a table of metrics is measured as a whole: load, ground,
+            energy and branch.
+        low: No run has a lower value; metrics.json is refused with one. Of rows with a function.
     """
 
     key: str
@@ -28,13 +44,52 @@ class Metric(NamedTuple):
     tolerance: float | None = None
     less_is_better: bool = False
     detail: bool = False
+    hidden_at_zero: bool = False
+    function: Function | None = None
+    low: float = -math.inf
 
 
 CATALOGUE = (
-    Metric("tracking.rms", "tracking RMS", 1e3, "mm", tolerance=1e-9, less_is_better=True),
-    Metric("tracking.max", "tracking max", 1e3, "mm", tolerance=1e-9, less_is_better=True),
-    Metric("closure.rms", "loop gap RMS", 1e6, "um", tolerance=1e-9, less_is_better=True),
-    Metric("closure.max", "loop gap max", 1e6, "um", tolerance=1e-9, less_is_better=True),
+    Metric(
+        key="tracking.rms",
+        label="tracking RMS",
+        scale=1e3,
+        unit="mm",
+        tolerance=1e-9,
+        less_is_better=True,
+        function=tracking.rms,
+        low=0.0,
+    ),
+    Metric(
+        key="tracking.max",
+        label="tracking max",
+        scale=1e3,
+        unit="mm",
+        tolerance=1e-9,
+        less_is_better=True,
+        function=tracking.largest,
+        low=0.0,
+    ),
+    Metric(
+        key="closure.rms",
+        label="loop gap RMS",
+        scale=1e6,
+        unit="um",
+        tolerance=1e-9,
+        less_is_better=True,
+        function=closure.rms,
+        low=0.0,
+    ),
+    Metric(
+        key="closure.max",
+        label="loop gap max",
+        scale=1e6,
+        unit="um",
+        tolerance=1e-9,
+        less_is_better=True,
+        function=closure.largest,
+        low=0.0,
+    ),
     Metric("load.torque_rms.A", "torque A RMS", 1e3, "mN m", tolerance=1e-6),
     Metric("load.torque_rms.E", "torque E RMS", 1e3, "mN m", tolerance=1e-6),
     Metric("load.torque_peak.A", "torque A peak", 1e3, "mN m", tolerance=1e-6, less_is_better=True),
@@ -51,8 +106,24 @@ CATALOGUE = (
     Metric("load.work.E.net", "work E net", 1e3, "mJ", detail=True),
     Metric("load.opposing.fraction", "motors opposed", 1e2, "%", detail=True),
     Metric("load.opposing.energy", "energy motor to motor", 1e3, "mJ", detail=True),
-    Metric("load.saturated.A", "motor A saturated", 1e2, "%", tolerance=2e-3, less_is_better=True),
-    Metric("load.saturated.E", "motor E saturated", 1e2, "%", tolerance=2e-3, less_is_better=True),
+    Metric(
+        key="load.saturated.A",
+        label="motor A saturated",
+        scale=1e2,
+        unit="%",
+        tolerance=2e-3,
+        less_is_better=True,
+        hidden_at_zero=True,
+    ),
+    Metric(
+        key="load.saturated.E",
+        label="motor E saturated",
+        scale=1e2,
+        unit="%",
+        tolerance=2e-3,
+        less_is_better=True,
+        hidden_at_zero=True,
+    ),
     Metric("ground.force_max.x", "ground force x max", 1.0, "N", tolerance=1e-3),
     Metric("ground.force_max.z", "ground force z max", 1.0, "N", tolerance=1e-3),
     Metric("ground.stance_share", "time in stance", 1e2, "%", tolerance=2e-3),
@@ -85,11 +156,17 @@ SHOWN = {metric.key: (metric.label, metric.scale, metric.unit) for metric in CAT
 DETAILS = tuple(metric.key for metric in CATALOGUE if metric.detail)
 """Metrics that are shown only where they have a limit."""
 
+HIDDEN_AT_ZERO = tuple(metric.key for metric in CATALOGUE if metric.hidden_at_zero)
+"""Metrics that are shown only where they have a limit or are not 0."""
+
 ABSOLUTE = {metric.key: metric.tolerance for metric in CATALOGUE if metric.tolerance is not None}
 """The metrics of a baseline, and by how much more each may move, in its own unit."""
 
 LESS_IS_BETTER = tuple(metric.key for metric in CATALOGUE if metric.less_is_better)
 """Metrics of a baseline that fail only when they grow."""
+
+MEASURED = tuple(metric for metric in CATALOGUE if metric.function is not None)
+"""The metrics with a function of their own."""
 
 SMALLER = {"mm": "um", "um": "nm"}
 """The unit a thousand times smaller, for values that would have two zeros behind the point."""
@@ -105,3 +182,23 @@ def shown(key: str, value: float | None) -> str:
         number = 1e3 * number
         unit = SMALLER[unit]
     return f"{number:.4g} {unit}".strip()
+
+
+def measure(leg: FiveBar, record: Mapping[str, Array], window: slice) -> dict[str, Any]:
+    """Return the metrics that have a function, in tables by the first part of their keys.
+
+    Those of the ground are left out of a run without one.
+
+    Args:
+        leg: The leg.
+        record: The columns of rollout.parquet.
+        window: The rows that tracking and load are measured over.
+    """
+    tables: dict[str, Any] = {}
+    for metric in MEASURED:
+        if metric.key in GROUND_KEYS and "ground_z" not in record:
+            continue
+        assert metric.function is not None
+        table, _, name = metric.key.partition(".")
+        tables.setdefault(table, {})[name] = metric.function(leg, record, window)
+    return tables

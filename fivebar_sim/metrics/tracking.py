@@ -31,3 +31,20 @@ def left_path(leg: FiveBar, record: Mapping[str, Array], by: float) -> float:
     """
     near = (tracking_error(record) <= 0.1 * leg.size) & (record["time"] <= by)
     return float(record["time"][np.flatnonzero(near)[-1]]) if near.any() else 0.0
+
+
+def rms(leg: FiveBar, record: Mapping[str, Array], window: slice) -> float:
+    """Return sqrt(mean e^2) of the tracking error e over the window [m]."""
+    del leg
+    return root_mean_square(tracking_error(record)[window])
+
+
+def largest(leg: FiveBar, record: Mapping[str, Array], window: slice) -> float:
+    """Return the largest tracking error of the window [m]."""
+    del leg
+    return float(tracking_error(record)[window].max())
+
+
+def root_mean_square(values: Array) -> float:
+    """Return sqrt(mean values^2)."""
+    return float(np.sqrt(np.mean(values**2)))

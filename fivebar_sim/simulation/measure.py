@@ -10,9 +10,8 @@ import numpy as np
 from fivebar_sim import kinematics
 from fivebar_sim.arrays import Array, Bools
 from fivebar_sim.geometry import FiveBar
-from fivebar_sim.metrics import energy, ground, guards, load
+from fivebar_sim.metrics import catalogue, energy, ground, guards, load
 from fivebar_sim.metrics.columns import JOINT_COLUMNS
-from fivebar_sim.metrics.tracking import tracking_error
 from fivebar_sim.paths import Gait
 
 if TYPE_CHECKING:
@@ -38,10 +37,9 @@ class Unrecorded(NamedTuple):
 def measure(scenario: Scenario, record: Mapping[str, Array], besides: Unrecorded) -> dict[str, Any]:
     """Return the metrics of a run, in SI units.
 
-    With e = |foot - target| over the window, tracking.rms = sqrt(mean e^2); load is that of
-    `load.measure`, and saturated the part of the steps in which the torque limit clipped. closure
-    is the loop gap over the whole run, energy that of `energy.measure`; branch and guards look at
-    every step.
+    tracking, closure and whatever else has a function of its own are those of `catalogue`; load is
+    that of `load.measure`, and saturated the part of the steps in which the torque limit clipped;
+    energy is that of `energy.measure`; branch and guards look at every step.
 
     Args:
         scenario: What was run.
@@ -65,11 +63,7 @@ def measure(scenario: Scenario, record: Mapping[str, Array], besides: Unrecorded
         command=scenario.command,
     )
     window = scenario.window
-    error = tracking_error(record)[window]
-    gap = record["gap"]
-    measured = {
-        "tracking": {"rms": _rms(error), "max": float(error.max())},
-        "closure": {"rms": _rms(gap), "max": float(gap.max())},
+    tables: dict[str, Any] = {
         "load": _load(scenario, record, start, saturated),
         "energy": energy.measure(balance),
         "branch": branch,
@@ -78,7 +72,12 @@ def measure(scenario: Scenario, record: Mapping[str, Array], besides: Unrecorded
     }
 
     if "ground_z" in record:
-        measured["ground"] = ground.measure(leg, record, window)
+        tables["ground"] = ground.measure(leg, record, window)
+
+    # a row of the catalogue may add to one of these tables
+    measured = catalogue.measure(leg, record, window)
+    for name, table in tables.items():
+        measured[name] = {**table, **measured[name]} if name in measured else table
     return measured
 
 
@@ -126,7 +125,3 @@ def _branch(leg: FiveBar, record: Mapping[str, Array]) -> dict[str, Any]:
         "flips": int(flipped.sum()),
         "first_flip": float(record["time"][np.argmax(flipped)]) if flipped.any() else None,
     }
-
-
-def _rms(values: Array) -> float:
-    return float(np.sqrt(np.mean(values**2)))
