@@ -12,7 +12,7 @@ from rich.measure import Measurement
 from rich.table import Table
 
 from fivebar_sim.metrics import guards
-from fivebar_sim.metrics.catalogue import DETAILS, SHOWN, shown
+from fivebar_sim.metrics.catalogue import DETAILS, HIDDEN_AT_ZERO, SHOWN, shown
 from fivebar_sim.metrics.limits import bounds, look_up
 
 if TYPE_CHECKING:
@@ -51,9 +51,9 @@ def print_result(result: Result, where: str, console: Console) -> None:
 
 def _matters(key: str, result: Result) -> bool:
     """Return whether a metric without a limit is worth a line."""
-    if key.startswith("load.saturated"):
+    if key in HIDDEN_AT_ZERO:
         return bool(look_up(result.metrics, key))
-    return not key.startswith(DETAILS)
+    return key not in DETAILS
 
 
 def print_check(checked: Sequence[Checked], console: Console) -> None:

@@ -135,7 +135,7 @@ def _against(key: str, recorded: Recorded, now: float | None) -> tuple[str, str]
         return (PASS, "") if same else (FAIL, f"{shown(key, now)}, baseline {shown(key, then)}")
     if abs(now - then) <= recorded.tolerance:
         return PASS, ""
-    less = key.startswith(LESS_IS_BETTER) and now < then
+    less = key in LESS_IS_BETTER and now < then
     tolerance = f"{shown(key, recorded.tolerance)} allowed"
     moved = f"{shown(key, now)}, baseline {shown(key, then)} ({_change(then, now, key)}; "
     return (BETTER if less else FAIL), f"{moved}{tolerance})"

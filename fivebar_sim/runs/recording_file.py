@@ -9,9 +9,9 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
-from fivebar_sim.runs import stored
 from fivebar_sim.errors import ConfigError
 from fivebar_sim.recording import check, rrd
+from fivebar_sim.runs import stored
 
 RECORDING = "recording.rrd"
 

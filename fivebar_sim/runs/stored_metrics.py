@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import json
 import re
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, Optional
 
 import msgspec
 
 from fivebar_sim.errors import RunDirectoryError, unknown
 from fivebar_sim.files import input_file, tables
 from fivebar_sim.metrics import guards
-from fivebar_sim.metrics.catalogue import LIMIT_KEYS
+from fivebar_sim.metrics.catalogue import LIMIT_KEYS, MEASURED, Metric
 
 LARGEST = 1e100
 """No metric is larger: what is done with one cannot overflow."""
@@ -27,13 +28,6 @@ Sign = Annotated[int, msgspec.Meta(ge=-1, le=1)]
 
 class Table(msgspec.Struct, forbid_unknown_fields=True):
     """A table whose keys are all known."""
-
-
-class Error(Table):
-    """Of "tracking" and "closure" [m]."""
-
-    rms: Amount
-    max: Amount
 
 
 class Motors(Table):
@@ -182,11 +176,9 @@ class Ground(Table):
     flight_max: Amount
 
 
-class Metrics(Table):
-    """All of metrics.json."""
+class Whole(Table):
+    """What metrics.json has besides the metrics with a function of their own."""
 
-    tracking: Error
-    closure: Error
     load: Load
     energy: Energy
     branch: Branch
@@ -196,6 +188,31 @@ class Metrics(Table):
     limits: list[Limit]
     provenance: dict[str, str | int | float | None]
     ground: Ground | msgspec.UnsetType = msgspec.UNSET
+
+
+def _with_rows(rows: Sequence[Metric]) -> type[msgspec.Struct]:
+    """Return the type of metrics.json: `Whole`, and the metrics that the catalogue has besides."""
+    tables: dict[str, list[tuple[str, Any]]] = {}
+    for row in rows:
+        table, _, name = row.key.partition(".")
+        low = max(row.low, -LARGEST)
+        number = Optional[Annotated[float, msgspec.Meta(ge=low, le=LARGEST)]]  # noqa: UP045
+        tables.setdefault(table, []).append((name, number))
+
+    own = {"load": Load, "energy": Energy, "branch": Branch, "ground": Ground}
+    fields: list[Any] = []
+    for table, names in tables.items():
+        base = own.get(table, Table)
+        kind: Any = msgspec.defstruct(table, names, bases=(base,), kw_only=True)
+        if base is Ground:
+            fields.append((table, kind | msgspec.UnsetType, msgspec.UNSET))
+        else:
+            fields.append((table, kind))
+    return msgspec.defstruct("Metrics", fields, bases=(Whole,), kw_only=True)
+
+
+Metrics = _with_rows(MEASURED)
+"""All of metrics.json."""
 
 
 def read(file: Path, *, grounded: bool) -> dict[str, Any]:
