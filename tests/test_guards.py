@@ -13,7 +13,7 @@ from fivebar_sim import rollout
 from fivebar_sim.arrays import Array
 from fivebar_sim.errors import ArgumentError, ConfigError
 from fivebar_sim.geometry import FiveBar
-from fivebar_sim.metrics import guards
+from fivebar_sim.metrics import guards, lasting
 from fivebar_sim.metrics.guards import Guard, Guards
 from fivebar_sim.rollout import Plan, Result
 from fivebar_sim.scenario import Scenario
@@ -134,12 +134,12 @@ def test_clipped_time_is_of_the_worse_motor_within_a_second() -> None:
     saturated = np.zeros((300, 2), dtype=bool)
     saturated[100:200:2, 0] = True
     saturated[50:80, 1] = True
-    so_far = guards._clipped(saturated, time)
+    so_far = lasting.clipped(saturated, time)
     assert so_far.max() == pytest.approx(0.5)
     assert time[so_far.argmax()] == pytest.approx(1.99)  # the fiftieth step
     assert so_far[79] == pytest.approx(0.3)
     assert so_far[-1] == 0.0
-    short = guards._clipped(saturated[50:80], time[:30])  # all of a run of 0.3 s
+    short = lasting.clipped(saturated[50:80], time[:30])  # all of a run of 0.3 s
     assert short[[0, 14, 29]] == pytest.approx([1 / 30, 0.5, 1.0])
 
 
@@ -152,7 +152,7 @@ def test_chatter_is_up_and_down_with_every_command_and_lasts(rng: np.random.Gene
 
     def most(torque: Array) -> float:
         record = {"time": time, "torque_A": torque, "torque_E": load}
-        return float(guards._chattering(record, 10).max())
+        return float(lasting.chattering(record, 10).max())
 
     assert most(3.0 + 0.5 * turning) == 1.0  # on top of a load too
     assert most(np.where(time < 0.3, turning, 0.1 * load)) == pytest.approx(0.28, abs=0.021)
@@ -199,3 +199,27 @@ def test_everyone_is_told(shell: Shell) -> None:
     metrics = json.loads(Path("run/metrics.json").read_text())
     assert not metrics["limits"]
     assert metrics["verdict"] == "fail"
+
+
+def test_new_guard_is_a_row_and_a_function(shell: Shell, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Verdict, console, report and JUnit have a guard that only its row names."""
+
+    def too_deep(run: guards.Checked) -> guards.Found:
+        depth = float(-run.record["foot_z"].min())
+        return guards.Found(depth, 0.01, float(run.record["time"][3]))
+
+    row = guards.Row("depth", too_deep, "foot below {:.3g} mm", ", {:.3g} at worst", 1e3, "mm")
+    monkeypatch.setattr(guards, "GUARDS", (*guards.GUARDS, row))
+    monkeypatch.setitem(guards.ROWS, row.name, row)
+
+    words = "guard depth: foot below 10 mm at t = 0.004 s, "
+    said = shell("run", "short.toml", "--out", "run")
+    assert said.status == 1
+    assert words in said.out
+    depth = json.loads(Path("run/metrics.json").read_text())["guards"][-1]["value"]
+    assert shell("report", "run").status == 0
+    page = Path("run/report.html").read_text()
+    assert "&lt;= 10 mm" in page
+    assert f"{1e3 * depth:.4g} mm" in page
+    assert shell("check", "short.toml", "--junit", "junit.xml").status == 1
+    assert words in Path("junit.xml").read_text()

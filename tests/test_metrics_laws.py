@@ -168,10 +168,10 @@ def test_energy_and_guards_are_those_of_the_whole_run(rng: np.random.Generator, 
     more = besides(record, saturated)
     works = energy.balance(energy.Body(LEG, *mine), record, more.steps)
     assert found["energy"] == energy.measure(works)
-    judged = guards.judge(
-        scenario.guards, LEG, record, branch=found["branch"], saturated=saturated, balance=works,
-        unsolved=more.unsolved, command=1,
-    )  # fmt: skip
+    checked = guards.Checked(
+        scenario.guards, LEG, record, found["branch"], saturated, works, more.unsolved, command=1
+    )
+    judged = guards.judge(checked)
     assert [{**guard._asdict(), "ok": guard.ok} for guard in judged] == found["guards"]
     passed = {guard["name"]: guard["ok"] for guard in found["guards"]}
     assert passed["branch"]

@@ -101,7 +101,7 @@ def test_every_limit_is_there_with_value_and_verdict(
             assert row in rows
         for guard in ("branch", "loop", "torque", "energy", "solver"):
             assert any(row[0] == f"guard {guard}" for row in rows)
-        assert ["guard branch", "<= 0", "0", "pass"] in rows
+        assert ["guard branch", "<= 0 flips", "0 flips", "pass"] in rows
     assert seen == {"pass", "FAIL"}
 
 

@@ -8,7 +8,7 @@ solver converges is not up to it.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
 import msgspec
@@ -19,12 +19,7 @@ from fivebar_sim.checks import check_number
 from fivebar_sim.geometry import FiveBar
 from fivebar_sim.metrics import ground
 from fivebar_sim.metrics.energy import Balance
-
-WITHIN = 1.0
-"""Over this time [s] clipped and chattering steps are added up; of a shorter run, over all."""
-
-FAINT = 0.1
-"""Changes of torque by at most this part of a run's largest are too faint to be chatter."""
+from fivebar_sim.metrics.lasting import chattering, clipped
 
 
 class Guards(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -81,62 +76,16 @@ class Guard(NamedTuple):
 
     def __str__(self) -> str:
         """Return what it says where it tripped: the bound, when, and the worst of the run."""
-        what, worst, scale = SAID[self.name]
-        high = scale * self.high
-        value = scale * (self.value or 0.0)
-        said = f"{what.format(high)} at t = {self.time:g} s{worst.format(value)}"
-        return f"guard {self.name}: {said}"
+        row = ROWS[self.name]
+        bound = row.what.format(row.scale * self.high)
+        worst = row.worst.format(row.scale * (self.value or 0.0))
+        return f"guard {self.name}: {bound} at t = {self.time:g} s{worst}"
 
 
-SAID = {
-    "branch": ("the leg left its branch", "", 1.0),
-    "loop": ("the loop was open by more than {:.3g} mm", ", by {:.3g} mm at worst", 1e3),
-    "ground": ("the foot was in the floor by more than {:.3g} mm", ", by {:.3g} mm at worst", 1e3),
-    "torque": (
-        "a motor's torque had been clipped for more than {:.3g} % of a second",
-        ", for {:.3g} % at worst",
-        1e2,
-    ),
-    "chatter": (
-        "a motor's torque had turned round with every command in more than {:.3g} % of a second",
-        ", in {:.3g} % at worst",
-        1e2,
-    ),
-    "energy": (
-        "more than {:.3g} % of the energy turned over was unaccounted for",
-        ", {:.3g} % at worst",
-        1e2,
-    ),
-    "constraints": (
-        "loop, gears or ends of travel had given more than {:.3g} % of the energy turned over",
-        ", {:.3g} % at worst",
-        1e2,
-    ),
-    "step": (
-        "the steps by themselves had given or taken more than {:.3g} % of the energy turned over",
-        ", {:.3g} % at worst",
-        1e2,
-    ),
-    "solver": ("MuJoCo's solver did not converge", ", nor in {:.0f} steps in all", 1.0),
-}
-"""What a tripped guard says, with its bound before the time and the worst value after it, and the
-factor from SI of both."""
+class Checked(NamedTuple):
+    """The run that guards look at, over all of its steps.
 
-
-def judge(
-    bounds: Guards,
-    leg: FiveBar,
-    record: Mapping[str, Array],
-    *,
-    branch: Mapping[str, Any],
-    saturated: Bools,
-    balance: Balance,
-    unsolved: Bools,
-    command: int,
-) -> list[Guard]:
-    """Return every guard of a run, over all of its steps.
-
-    Args:
+    Attributes:
         bounds: Of the scenario.
         leg: The leg.
         record: The columns of rollout.parquet.
@@ -146,22 +95,53 @@ def judge(
         unsolved: Whether the constraint solver ran out of iterations in each step, (N,).
         command: Steps from one command of the motors to the next.
     """
-    time = record["time"]
-    found = [
-        Guard("branch", float(branch["flips"]), 0.0, branch["first_flip"]),
-        _highest("loop", record["gap"], bounds.loop * leg.size, time),
-        _highest("torque", _clipped(saturated, time), bounds.torque, time),
-        _highest("chatter", _chattering(record, command), bounds.chatter, time),
-        _part("energy", balance.unaccounted, bounds.energy, balance, time),
-        _part("constraints", balance.given, bounds.constraints, balance, time),
-        _part("step", np.cumsum(balance.step), bounds.step, balance, time),
-        Guard("solver", float(unsolved.sum()), 0.0, _first(unsolved, time)),
-    ]
-    if "ground_z" in record:
-        depth = np.maximum(-ground.height(leg, record), 0.0)
-        found.append(_highest("ground", depth, bounds.ground * 2.0 * leg.foot_radius, time))
 
-    return found
+    bounds: Guards
+    leg: FiveBar
+    record: Mapping[str, Array]
+    branch: Mapping[str, Any]
+    saturated: Bools
+    balance: Balance
+    unsolved: Bools
+    command: int
+
+
+class Found(NamedTuple):
+    """What a guard's function found: the worst value, the bound [SI], when it tripped [s]."""
+
+    value: float | None
+    high: float
+    time: float | None
+
+
+class Row(NamedTuple):
+    """A guard of the catalogue.
+
+    Attributes:
+        name: What people call it; its bound in a scenario, if it has one, is of that name.
+        function: Looks for it; None is for a run in which there is nothing to look for.
+        what: Said where it tripped, before the time, with the bound.
+        worst: Said after the time, with the worst value.
+        scale: Factor from SI to the shown unit.
+        unit: The shown unit.
+    """
+
+    name: str
+    function: Callable[[Checked], Found | None]
+    what: str
+    worst: str
+    scale: float
+    unit: str
+
+    def show(self, value: float | None) -> str:
+        """Return a bound or a value as people read it: "1.2 mm"."""
+        return f"{self.scale * (value or 0.0):.4g} {self.unit}"
+
+
+def judge(run: Checked) -> list[Guard]:
+    """Return every guard of a run."""
+    found = [(row.name, row.function(run)) for row in GUARDS]
+    return [Guard(name, *each) for name, each in found if each is not None]
 
 
 def tripped(guards: list[Mapping[str, Any]]) -> list[str]:
@@ -170,51 +150,129 @@ def tripped(guards: list[Mapping[str, Any]]) -> list[str]:
     return [str(guard) for guard in known if not guard.ok]
 
 
-def _highest(name: str, values: Array, high: float, time: Array) -> Guard:
-    return Guard(name, float(values.max()), high, _first(values > high, time))
+def _left_branch(run: Checked) -> Found:
+    return Found(float(run.branch["flips"]), 0.0, run.branch["first_flip"])
+
+
+def _open_loop(run: Checked) -> Found:
+    return _highest(run, run.record["gap"], run.bounds.loop * run.leg.size)
+
+
+def _clipped_torque(run: Checked) -> Found:
+    return _highest(run, clipped(run.saturated, run.record["time"]), run.bounds.torque)
+
+
+def _chatter(run: Checked) -> Found:
+    return _highest(run, chattering(run.record, run.command), run.bounds.chatter)
+
+
+def _unaccounted_energy(run: Checked) -> Found:
+    return _part(run, run.balance.unaccounted, run.bounds.energy)
+
+
+def _giving_constraints(run: Checked) -> Found:
+    return _part(run, run.balance.given, run.bounds.constraints)
+
+
+def _giving_steps(run: Checked) -> Found:
+    return _part(run, np.cumsum(run.balance.step), run.bounds.step)
+
+
+def _unsolved(run: Checked) -> Found:
+    return Found(float(run.unsolved.sum()), 0.0, _first(run.unsolved, run.record["time"]))
+
+
+def _in_floor(run: Checked) -> Found | None:
+    if "ground_z" not in run.record:
+        return None
+    depth = np.maximum(-ground.height(run.leg, run.record), 0.0)
+    return _highest(run, depth, run.bounds.ground * 2.0 * run.leg.foot_radius)
+
+
+def _highest(run: Checked, values: Array, high: float) -> Found:
+    return Found(float(values.max()), high, _first(values > high, run.record["time"]))
 
 
 def _first(chosen: Bools, time: Array) -> float | None:
     return float(time[np.argmax(chosen)]) if chosen.any() else None
 
 
-def _clipped(saturated: Bools, time: Array) -> Array:
-    """Return in which part of the second before it the worse motor was clipped, (N,)."""
-    window = _window(time)
-    return _sums(saturated, window).max(axis=1) / window
-
-
-def _chattering(record: Mapping[str, Array], command: int) -> Array:
-    """Return in which part of the second before it the worse motor's torque chattered, (N,).
-
-    It does in a step if it goes up and down, by more than `FAINT` of the run's largest torque, with
-    two commands one after the other: d = tau_k - tau_k-P of the other sign than P steps before, P
-    the steps of a command.
-    """
-    torque = np.stack([record["torque_A"], record["torque_E"]], axis=-1)
-    d = np.zeros_like(torque)
-    d[command:] = torque[command:] - torque[:-command]
-    d[np.abs(d) <= FAINT * np.abs(torque).max()] = 0.0
-    chatters = np.zeros(torque.shape, dtype=bool)
-    chatters[command:] = d[command:] * d[:-command] < 0.0
-    window = _window(record["time"])
-    return _sums(chatters, window).max(axis=1) / window
-
-
-def _window(time: Array) -> int:
-    """Return the steps of `WITHIN`, or of a shorter run."""
-    return min(max(1, round(WITHIN / float(time[0]))), len(time))
-
-
-def _sums(values: Bools, window: int) -> Array:
-    """Return the sums over the steps of a window that ends with each step, (N, 2)."""
-    so_far: Array = np.concatenate([np.zeros((1, 2)), np.cumsum(values, axis=0, dtype=float)])
-    begin = np.maximum(np.arange(1, len(values) + 1) - window, 0)
-    return so_far[1:] - so_far[begin]
-
-
-def _part(name: str, energy: Array, high: float, balance: Balance, time: Array) -> Guard:
-    """Return the guard of an energy so far, in parts of what was turned over in the run."""
+def _part(run: Checked, energy: Array, high: float) -> Found:
+    """Return the largest |energy so far|, in parts of what was turned over in the run."""
+    balance = run.balance
     if balance.imbalance is None:
-        return Guard(name, None, high, None)
-    return _highest(name, np.abs(energy) / balance.turnover, high, time)
+        return Found(None, high, None)
+    return _highest(run, np.abs(energy) / balance.turnover, high)
+
+
+GUARDS = (
+    Row("branch", _left_branch, "the leg left its branch", "", 1.0, "flips"),
+    Row(
+        "loop",
+        _open_loop,
+        "the loop was open by more than {:.3g} mm",
+        ", by {:.3g} mm at worst",
+        1e3,
+        "mm",
+    ),
+    Row(
+        "torque",
+        _clipped_torque,
+        "a motor's torque had been clipped for more than {:.3g} % of a second",
+        ", for {:.3g} % at worst",
+        1e2,
+        "%",
+    ),
+    Row(
+        "chatter",
+        _chatter,
+        "a motor's torque had turned round with every command in more than {:.3g} % of a second",
+        ", in {:.3g} % at worst",
+        1e2,
+        "%",
+    ),
+    Row(
+        "energy",
+        _unaccounted_energy,
+        "more than {:.3g} % of the energy turned over was unaccounted for",
+        ", {:.3g} % at worst",
+        1e2,
+        "%",
+    ),
+    Row(
+        "constraints",
+        _giving_constraints,
+        "loop, gears or ends of travel had given more than {:.3g} % of the energy turned over",
+        ", {:.3g} % at worst",
+        1e2,
+        "%",
+    ),
+    Row(
+        "step",
+        _giving_steps,
+        "the steps by themselves had given or taken more than {:.3g} % of the energy turned over",
+        ", {:.3g} % at worst",
+        1e2,
+        "%",
+    ),
+    Row(
+        "solver",
+        _unsolved,
+        "MuJoCo's solver did not converge",
+        ", nor in {:.0f} steps in all",
+        1.0,
+        "steps",
+    ),
+    Row(
+        "ground",
+        _in_floor,
+        "the foot was in the floor by more than {:.3g} mm",
+        ", by {:.3g} mm at worst",
+        1e3,
+        "mm",
+    ),
+)
+"""Every guard, in the order in which metrics.json has them; a new one is a row and a function."""
+
+ROWS = {row.name: row for row in GUARDS}
+"""The guards by name."""

@@ -79,8 +79,10 @@ def _limits(run: StoredRun) -> str:
         for limit in numbers.limits(run)
     ]
     for guard in run.metrics["guards"]:
-        high, value = (f"{guard[key] or 0.0:.4g}" for key in ("high", "value"))
-        rows.append((f"guard {guard['name']}", f"<= {high}", value, html.judged(guard["ok"])))
+        row = guards.ROWS[guard["name"]]
+        allowed = f"<= {row.show(guard['high'])}"
+        value = row.show(guard["value"])
+        rows.append((f"guard {row.name}", allowed, value, html.judged(guard["ok"])))
     return html.table(
         "The run passes if all of these hold.", ("metric", "limit", "value", ""), rows
     )

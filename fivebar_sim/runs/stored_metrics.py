@@ -139,8 +139,8 @@ class Guard(Table):
     ok: bool
 
     def __post_init__(self) -> None:
-        if self.name not in guards.SAID:
-            raise ValueError(unknown("guard", self.name, guards.SAID))
+        if self.name not in guards.ROWS:
+            raise ValueError(unknown("guard", self.name, guards.ROWS))
         if self.ok != (self.time is None):
             raise ValueError(f"ok must be {str(not self.ok).lower()} with time {self.time}")
 

@@ -52,10 +52,10 @@ def measure(scenario: Scenario, record: Mapping[str, Array], besides: Unrecorded
     body = energy.Body(leg, scenario.payload, scenario.trunk)
     balance = energy.balance(body, record, besides.steps)
     branch = _branch(leg, record)
-    guarded = guards.judge(
-        scenario.guards,
-        leg,
-        record,
+    checked = guards.Checked(
+        bounds=scenario.guards,
+        leg=leg,
+        record=record,
         branch=branch,
         saturated=saturated,
         balance=balance,
@@ -67,7 +67,7 @@ def measure(scenario: Scenario, record: Mapping[str, Array], besides: Unrecorded
         "load": _load(scenario, record, start, saturated),
         "energy": energy.measure(balance),
         "branch": branch,
-        "guards": [{**guard._asdict(), "ok": guard.ok} for guard in guarded],
+        "guards": [{**guard._asdict(), "ok": guard.ok} for guard in guards.judge(checked)],
         "warnings": int(besides.warnings),
     }
 
