@@ -63,7 +63,8 @@ def check(
     if update:
         checked = [_update(*each) for each in zip(checked, results, olds, places, strict=True)]
 
-    status = max(_keep(each, result, keep) for each, result in zip(checked, results, strict=True))
+    kept = [_keep(each, result, keep) for each, result in zip(checked, results, strict=True)]
+    status = max(_status(each, ok=ok) for each, ok in zip(checked, kept, strict=True))
     if not quiet:
         console.print_check(checked, screen())
 
@@ -154,15 +155,26 @@ def _update(
     return accepted._replace(notes=[f"baseline recorded in {place}"])
 
 
-def _keep(checked: Checked, result: Result | DivergedError, folder: Path) -> int:
-    """Write the run directory of a scenario that failed; return its exit status."""
-    if not checked.failures:
-        return 0
-    if not isinstance(result, DivergedError):
-        place = folder / checked.name
-        try:
-            checked.notes.append(f"its run is kept in {result.write(place)}")
-        except RunDirectoryError as error:
-            say(error)
-            return WRONG
-    return FAILED
+def _keep(checked: Checked, result: Result | DivergedError, folder: Path) -> bool:
+    """Write the run directory of a scenario that failed, if it has one; return False if it can't.
+
+    A note says where it is.
+    """
+    if not checked.failures or isinstance(result, DivergedError):
+        return True
+
+    try:
+        place = result.write(folder / checked.name)
+    except RunDirectoryError as error:
+        say(error)
+        return False
+
+    checked.notes.append(f"its run is kept in {place}")
+    return True
+
+
+def _status(checked: Checked, *, ok: bool) -> int:
+    """Return the exit status of a scenario, given whether its run could be kept."""
+    if not ok:
+        return WRONG
+    return FAILED if checked.failures else 0
