@@ -75,6 +75,7 @@ def moved(body: Link, at: tuple[float, float], angle: float = 0.0) -> Link:
 def combined(*bodies: Link) -> Link:
     """Return several bodies of one frame as one, by the parallel axis theorem."""
     mass = sum(b.mass for b in bodies)
+    # No mass has no centre: any of the bodies is the answer.
     if mass == 0.0:
         return bodies[0]
     x = sum(b.mass * b.com[0] for b in bodies) / mass
@@ -158,13 +159,16 @@ class FiveBar:
         for key in ("bend", "tilt"):
             _check(key, getattr(self, key), low=-math.pi, high=math.pi)
 
+        # With F on B side A is one link: no inverse kinematics can tell where L2 points.
         if not math.hypot(*self.foot_offset) > CLOSING * self.L2:
             raise GeometryError(f"L6: the foot lies on B; got L6 = L2 = {self.L6:g} m, bent back")
 
         self._check_modes()
         self._check_masses()
+        # Frozen, so that a leg can be a key of a cache: fields are set past the dataclass.
         object.__setattr__(self, "gravity", _floats("gravity", self.gravity, 2))
         lengths = {key: getattr(self, key) for key in ("L1", "L2", "L3", "L4", "L5")}
+        # A closed polygon needs its longest side no longer than the rest together.
         longest = max(lengths, key=lengths.__getitem__)
         others = sum(lengths.values()) - lengths[longest]
         if not lengths[longest] <= others * (1.0 + CLOSING):
@@ -175,6 +179,7 @@ class FiveBar:
 
     def _check_modes(self) -> None:
         mode = tuple(self.mode) if isinstance(self.mode, (tuple, list)) else ()
+        # True == 1 in Python, and would pass as a sign but for the check of the type.
         if mode not in MODES or not all(type(s) is int for s in mode):
             raise GeometryError(f"mode must be one of {MODES}, got {self.mode!r}")
         object.__setattr__(self, "mode", mode)
@@ -216,6 +221,7 @@ class FiveBar:
             return L1, L2, L3, L4
 
         L1, L2, L3, L4 = (capsule(L, self.radius, self.density) for L in lengths)
+        # Foot and extension are rigid with L2, so their inertia is its inertia.
         parts = [L2, moved(ball(self.foot_radius, self.density), self.foot_offset)]
         if self.L6 > 0.0:
             extension = capsule(self.L6, self.radius, self.density)
@@ -252,6 +258,7 @@ class FiveBar:
 
         try:
             values: dict[str, Any] = {
+                # TOML has only lists; a frozen leg must be hashable.
                 key: tuple(value) if isinstance(value, list) else value
                 for key, value in table.items()
             }

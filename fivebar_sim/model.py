@@ -69,6 +69,7 @@ def build(
         with quiet():
             return spec.compile()
     except ValueError as error:
+        # MuJoCo's messages span lines; ours are one line.
         said = " ".join(str(error).split())
         raise GeometryError(f"MuJoCo refuses leg {leg.name!r}: {said}") from None
 
@@ -119,8 +120,10 @@ def leg_spec(
 
     spec.option.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{integrator.upper()}")
     gx, gz = leg.gravity
+    # MuJoCo is three-dimensional: the leg moves in its xz-plane, y points away.
     spec.option.gravity = (gx, 0.0, gz)
 
+    # The model is compiled in this pose: a closed one, far from every singularity.
     q = kinematics.home(leg)
     _place(spec, leg, q)
     _size(spec, leg)
@@ -146,6 +149,7 @@ def _stand(spec: mujoco.MjSpec, leg: FiveBar, scene: Ground, q: Array) -> None:
     """Put the hip on the rail with its trunk, and in the keyframes the foot on the floor."""
     spec.body("hip").pos = (0.0, 0.0, 0.0)
     hip_z = spec.joint("hip_z")
+    # With reference 0 the joint's coordinate is the hip's height above the floor itself.
     hip_z.ref = 0.0
     if scene.stop is not None:
         hip_z.range = (scene.stop, LONGEST)
@@ -154,10 +158,12 @@ def _stand(spec: mujoco.MjSpec, leg: FiveBar, scene: Ground, q: Array) -> None:
     trunk = spec.body("trunk")
     trunk.mass = scene.mass
     trunk.ipos = (0.0, 0.0, 0.0)
+    # Drawn above the hip, so that it hides no link; its mass sits in the hip.
     spec.geom("trunk").pos = (0.0, 0.0, 2.5 * leg.radius)
     spec.geom("foot").friction[0] = scene.friction
 
     if isinstance(scene, Treadmill):
+        # A belt that carries the foot backward: the leg stays where it is and walks forward.
         spec.geom("floor").surfacevel = (-(scene.speed or 0.0), 0.0, 0.0, 0.0, 0.0, 0.0)
 
     for key in spec.keys:
@@ -204,6 +210,7 @@ def _place(spec: mujoco.MjSpec, leg: FiveBar, q: Array) -> None:
         spec.site(site).pos = pos
 
     spec.key("home").qpos = q
+    # A scene may have actuators of its own, and they come before the leg's two.
     spec.key("home").ctrl = (*[0.0] * (len(spec.actuators) - 2), *q[[0, 2]])
 
 
@@ -215,6 +222,7 @@ def _size(spec: mujoco.MjSpec, leg: FiveBar) -> None:
     along, across = leg.foot_offset
     if leg.L6 > 0.0:
         extension = spec.body("L2").add_geom(spec.geom("L2").classname, name="L6")
+        # A geom added here takes class defaults, but not what its neighbour sets itself.
         extension.material = spec.geom("L2").material
         _capsule(extension, leg.radius, (leg.L2, 0.0), (along, across))
 
@@ -239,6 +247,8 @@ def _weigh(spec: mujoco.MjSpec, leg: FiveBar) -> None:
     for joint in ("A", "E"):
         spec.joint(joint).armature = leg.armature
     for name, link in zip(("L1", "L2", "L3", "L4"), leg.links, strict=True):
+        # Densities let MuJoCo weigh the geoms itself: a check of `FiveBar.links`, which
+        # computes the same inertia in closed form.
         if leg.mass is None:
             for geom in spec.body(name).geoms:
                 geom.density = leg.density
@@ -272,6 +282,7 @@ def _drive(spec: mujoco.MjSpec, servo: Servo | None, drive: Drive) -> None:
             continue
         if servo.friction > 0.0:  # hard: with MuJoCo's own values a light joint does not stick
             joint.frictionloss = servo.friction
+            # Two timesteps is the shortest time constant that MuJoCo's solver keeps stable.
             joint.solref_friction = (2.0 * spec.option.timestep, 1.0)
             joint.solimp_friction[:3] = (0.9999, 0.9999, 0.001)
         if servo.limit is not None:

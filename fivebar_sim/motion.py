@@ -80,6 +80,7 @@ def plan(
     """
     time: Array = np.arange(steps + 1, dtype=np.float64) * timestep
     wanted = path.at(time)
+    # Compared by identity below: only projected targets lose their analytic rates.
     foot = _projected(leg, wanted, time) if path.outside == "nearest" else wanted
     try:
         kinematics.inverse(leg, foot.position)
@@ -88,6 +89,7 @@ def plan(
 
     q, q_dot, q_ddot = kinematics.joint_motion(leg, *foot)
     rest = kinematics.home(leg)
+    # Angles come in (-pi, pi]; a motor that goes round must not jump by a turn.
     q = _continuous(rest, q)
     _check_stops(leg, rest, foot.position, time, q)
 
@@ -132,6 +134,7 @@ def rates(values: Array, timestep: float) -> tuple[Array, Array]:
         values: p at steps of h, (N + 1, n).
         timestep: h [s].
     """
+    # A row put in at either end, such that the central difference is one-sided there.
     before = 2.0 * values[:1] - values[1:2]
     after = 2.0 * values[-1:] - values[-2:-1]
     p = np.concatenate([before, values, after])
@@ -142,6 +145,7 @@ def _projected(leg: FiveBar, wanted: Sample, time: Array) -> Sample:
     """Return the targets with those out of reach replaced; the same object if there are none."""
     targets = wanted.position
     if leg.L6 > 0.0:
+        # Nothing to project, so no margin is needed.
         if workspace.reachable(leg, targets, mode=leg.mode).all():
             return wanted
         raise ArgumentError(f'outside = "nearest" needs a leg with L6 = 0, got {leg.L6:g} m')
@@ -151,6 +155,7 @@ def _projected(leg: FiveBar, wanted: Sample, time: Array) -> Sample:
         return wanted
 
     moved = _lengths(np.diff(foot, axis=0))
+    # A jump from one edge to another is no slide: the motors could not follow it.
     fastest = _lengths(np.diff(targets, axis=0)).max()
     jumps = np.concatenate([[False], moved > FASTEST_SLIDE * fastest])
     what = f"moves the nearest reachable point more than {FASTEST_SLIDE:g} times as fast as itself"
@@ -172,6 +177,7 @@ def _continuous(rest: Array, q: Array) -> Array:
     q = np.unwrap(q, axis=0)
     turn = 2.0 * np.pi
     q[:, [0, 2]] += turn * np.round((rest - q[0]) / turn)[[0, 2]]
+    # A and E got their turns each for itself; the stops decide which one E is really in.
     middle = 0.5 * sum(stops_at_C(rest))
     q[:, 2] += turn * np.round((angle_at_C(q[0]) - middle) / turn)
     return q
@@ -180,6 +186,7 @@ def _continuous(rest: Array, q: Array) -> Array:
 def _check_stops(leg: FiveBar, rest: Array, foot: Array, time: Array, q: Array) -> None:
     low, high = stops_at_C(rest)
     angle = angle_at_C(q)
+    # The stops lie C_STOP before a singular pose: further on the angle has passed through it.
     flipped = (angle < low - C_STOP) | (angle > high + C_STOP)
     _refuse(flipped, foot, time, f"needs the other assembly mode; the leg's is {leg.assembly:+d}")
     stopped = (angle < low) | (angle > high)

@@ -206,9 +206,11 @@ def _drawn(leg: FiveBar, cells: int) -> _Atlas:
     knees[:, 1::2] -= q[:, ::2]  # relative to L1 and L4
     points = chain_points(leg, knees)
     triple = signs(leg, distances_of(leg, points))
+    # No pose and a singular pose alike belong to no aspect, so nothing links to them.
     triple[~closed | (triple == 0).any(axis=-1)] = 0
 
     corners = _corners(q, _sheets(leg, points), cells)
+    # Every node is linked with the corners of its own cells in all three charts.
     one = np.repeat(np.arange(len(q)), corners.shape[1])
     other = corners.ravel()
     joined = triple[one].any(axis=-1) & (triple[one] == triple[other]).all(axis=-1)
@@ -226,6 +228,7 @@ def _chart(leg: FiveBar, chart: int, s: int, cells: int) -> tuple[Array, Bools]:
     if chart == 0:
         B = A + leg.L1 * unit(first)
         D = E + leg.L4 * unit(second)
+        # B, C, D are a chain of two links like a leg's side, with C as its knee.
         psi_2, ok = side_angle(D - B, leg.L2, leg.L3, s)
         C = B + leg.L2 * unit(psi_2)
         return np.stack([first, psi_2, second, _direction(C - D)], axis=-1), ok
@@ -236,6 +239,7 @@ def _chart(leg: FiveBar, chart: int, s: int, cells: int) -> tuple[Array, Bools]:
     C = one[0] + one[1] * unit(first) + one[2] * unit(second)
     third, ok = side_angle(C - other[0], other[1], other[2], s)
     fourth = _direction(C - other[0] - other[1] * unit(third))
+    # Both charts give the angles in the one order of the atlas.
     order = (first, second, third, fourth) if chart == 1 else (third, fourth, first, second)
 
     return np.stack(order, axis=-1), ok
@@ -283,8 +287,10 @@ def _roots(count: int, one: Ints, other: Ints) -> Ints:
     """
     root = np.arange(count)
     while len(one):
+        # Union-find of all links at once: a pass in NumPy, not a loop over 86,400 nodes.
         ends = root[one], root[other]
         np.minimum.at(root, np.maximum(*ends), np.minimum(*ends))
+        # Halving the paths until every one ends at its root.
         while (longer := root[root] != root).any():
             root[longer] = root[root[longer]]
         differ = root[one] != root[other]
@@ -299,6 +305,7 @@ def _numbered(triple: Ints, root: Ints) -> Ints:
     for signs_of_part in np.unique(triple[triple.any(axis=-1)], axis=0):
         here = np.flatnonzero((triple == signs_of_part).all(axis=-1))
         _, which, count = np.unique(root[here], return_inverse=True, return_counts=True)
+        # The rank of each part by size; "stable", so that equal parts keep their order.
         rank = np.argsort(np.argsort(-count, kind="stable")) + 1
         part[here] = np.where(count >= FEW, rank, 0)[which]
     return part

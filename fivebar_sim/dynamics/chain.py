@@ -131,8 +131,10 @@ class Chain:
 
         check_number("payload", payload, "kg", low=0.0, high=HEAVIEST)
         one, two, three, four = leg.links
+        # The foot is part of L2, so what it carries is too.
         two = combined(two, Link(payload, leg.foot_offset, 0.0))
         x, z = kinematics.bases(leg)[1].tolist()  # E = -A
+        # E = -A: the moments of the masses hung there differ in sign only.
         right = three.mass + four.mass - one.mass - two.mass
 
         return cls(
@@ -173,10 +175,12 @@ class Chain:
         area = ((L2 + L3) ** 2 - d2) * (d2 - (L2 - L3) ** 2)  # (4 times that of BCD) squared
 
         if not (area > (2.0 * L2 * L3 * SINGULAR) ** 2).all():
+            # Only a bad pose gets here: `jacobian` raises what is wrong with it, and where.
             kinematics.jacobian(leg, np.stack([theta_A, theta_E], axis=-1), self.assembly)
 
         along = (d2 + (L2 - L3) * (L2 + L3)) / (2.0 * d2)
         across = self.assembly * np.sqrt(area) / (2.0 * d2)
+        # From BD to BC by similarity, so that L2 and L3 need no trigonometry.
         BC = along * x - across * z, along * z + across * x
         e2 = BC[0] / L2, BC[1] / L2
 
@@ -273,6 +277,7 @@ class Chain:
 
         (J^T F)_A = AB x F + a2 BF x F,   (J^T F)_E = b2 BF x F
         """
+        # Virtual work: the torque on L2 about B is spread as L2 turns with the motors.
         about_B = cross(placed(p.e2, self.leg.foot_offset), force)
         return self.leg.L1 * cross(p.e1, force) + p.a2 * about_B, p.b2 * about_B
 
@@ -283,6 +288,8 @@ class Chain:
         f_A, f_E = (0.0, 0.0) if force is None else self.foot_torques(p, force)
         t_A = tau[0] - h_A + f_A
         t_E = tau[1] - h_E + f_E
+        # Two by two: Cramer's rule is exact enough (M is positive definite) and needs no LAPACK
+        # call a step.
         det = M_AA * M_EE - M_AE * M_AE
         return (M_EE * t_A - M_AE * t_E) / det, (M_AA * t_E - M_AE * t_A) / det
 

@@ -111,6 +111,7 @@ class LegDynamics:
         force = (0.0, 0.0) if foot_force is None else foot_force
         theta, w, tau, F = _pairs(theta=theta, theta_dot=theta_dot, tau=tau, foot_force=force)
         p = self._chain.pose(*_split(theta))
+        # Coulomb friction works against the motion; at rest sign(0) = 0 leaves it out.
         driven = _split(tau - friction * np.sign(w))
         return np.stack(self._chain.accelerations(p, _split(w), driven, _split(F)), axis=-1)
 
@@ -127,6 +128,7 @@ class LegDynamics:
         """Return the inertia that the world feels at the foot [kg], (..., 2, 2)."""
         (theta,) = _pairs(theta=theta)
         p = self._chain.pose(*_split(theta))
+        # Where the foot cannot move in some direction the world feels an infinite mass.
         rho = float(np.hypot(*self.leg.foot_offset))
         _refuse(cross(p.e1, placed(p.e2, self.leg.foot_offset)) / rho, "A, B and F are in line")
         _refuse(cross(p.e4, p.e3), "E, D and C are in line")

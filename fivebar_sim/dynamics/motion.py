@@ -241,6 +241,7 @@ def _runge_kutta(plant: _Plant, q: Array, w: Array, h: float, rows: range, steps
         except (LoopOpenError, SingularError, _UnfitError) as error:
             raise _diverged(k * h, str(error)) from error
         q = after
+        # Membership in a range is arithmetic, not a search.
         if k + 1 in rows:
             row = (k + 1) // rows.step
             motion.theta[row] = q
@@ -266,6 +267,7 @@ def _step(plant: _Plant, t: float, q: Array, w: Array, h: float) -> tuple[Array,
 
     of y = (q, w), f = (w, alpha).
     """
+    # q needs no slopes of its own: its rate in each stage is the stage's w.
     half = 0.5 * h
     w1 = w
     alpha1 = _stacked(plant, t, q, w)
@@ -302,6 +304,7 @@ def _dop853(plant: _Plant, y: Array, times: Array, rtol: float, atol: float) -> 
                 raise _UnfitError("no step is short enough: are B, C and D in line?")
             inside = int(np.searchsorted(times, reached, side="right"))
             if inside > row:
+                # Not for every step: the interpolant costs three evaluations.
                 states[row:inside] = solver.dense_output()(times[row:inside]).T
                 row = inside
     except _UnfitError as error:

@@ -145,9 +145,11 @@ class _Steps(NamedTuple):
         """Return the steps of rows of joint angles, (..., N + 1, 4)."""
         check_number("timestep", timestep, "s", low=0.0, strict=True)
         A, B, E, D = np.moveaxis(q, -1, 0)
+        # Absolute directions L1, L2, L3, L4; the knees turn relative to the inner links.
         psi = np.stack([A, A + B, E + D, E])
         with np.errstate(over="ignore", invalid="ignore"):  # the check sees what they leave
             w_next = np.diff(psi, axis=-1) / timestep
+            # Before the first row nothing moves, as in a run that starts from rest.
             w = np.concatenate([np.zeros_like(w_next[..., :1]), w_next[..., :-1]], axis=-1)
             alpha = (w_next - w) / timestep
         if not np.isfinite(alpha).all():
@@ -177,6 +179,7 @@ def _forces(force: ArrayLike, shape: tuple[int, ...]) -> Array:
 def _pose(chain: Chain, psi: Four) -> Pose:
     """Return the pose of links that lie in the directions psi, the loop open or closed."""
     e1, e2, e3, e4 = ((np.cos(angle), np.sin(angle)) for angle in psi)
+    # The loop may be open by micrometres, so closure is not asked, only this.
     sine = np.abs(cross(e2, e3))
     if not (sine > SINGULAR).all():
         raise _in_line("B, C and D", float(sine.min()), first_index(sine <= SINGULAR))

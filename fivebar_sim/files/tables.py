@@ -45,6 +45,7 @@ def _loads(text: str) -> Table:
     """
     try:
         table = tomllib.loads(text)
+    # tomllib recurses into arrays; a file must not end in a traceback.
     except RecursionError:
         raise ValueError("nested too deep") from None
     if is_deep(table):
@@ -122,6 +123,7 @@ def check_finite(table: Mapping[str, Any], where: str) -> None:
         for number in _leaves(value):
             if isinstance(number, float) and not math.isfinite(number):
                 raise ConfigError(f"{where}: {key} must be finite, got {value}")
+            # TOML has 64 bits, and other readers of the stored scenario may have no more.
             if isinstance(number, int) and not -(2**63) <= number < 2**63:
                 raise ConfigError(f"{where}: {key} must fit in 64 bits, has {number.bit_length()}")
 
@@ -169,6 +171,7 @@ def bounds(
     for key, bound in flat(table):
         if key in limits:
             raise ConfigError(f"{where}: {name}.{key} is set twice")
+        # A single number is an upper bound: nothing is wanted from below.
         pair = bound if isinstance(bound, list) else [-math.inf, bound]
         numbers = all(isinstance(b, (int, float)) and not isinstance(b, bool) for b in pair)
         if len(pair) != 2 or not numbers or not pair[0] <= pair[1]:
@@ -228,6 +231,7 @@ def _explain(message: str, table: Table, kind: type, name: str) -> str:
     if not at:  # a Struct's own check, which begins with the key
         return f"{name}.{text}"
 
+    # The place may go on into an array: the value to show is the whole key's.
     key = re.split(r"[.\[]", at)[0]
     value = table.get(key)
     legal = get_args(get_type_hints(kind).get(key))

@@ -80,6 +80,7 @@ def loop_joint(leg: FiveBar, B: Array, D: Array, assembly: int | None = None) ->
     low = abs(leg.L2 - leg.L3)
     high = leg.L2 + leg.L3
     d2 = dot(BD, BD)
+    # A pose at the very edge of reach counts as closed, whichever way it was rounded.
     rounding = ROUNDING * (leg.size + leg.L5)  # of the coordinates of B and D [m]
     slack = rounding * high
     closed = (d2 >= low**2 - slack) & (d2 <= high**2 + slack) & (d2 > rounding**2)
@@ -87,6 +88,7 @@ def loop_joint(leg: FiveBar, B: Array, D: Array, assembly: int | None = None) ->
         raise _loop_open(np.sqrt(d2), ~closed, low, high)
 
     along = (d2 + (leg.L2 - leg.L3) * high) / (2.0 * d2)
+    # Within the slack the product may be just below 0: there h is 0.
     across = np.sqrt(np.maximum((high**2 - d2) * (d2 - low**2), 0.0)) / (2.0 * d2)
     return B + along[..., None] * BD + sign * across[..., None] * perp(BD)
 
@@ -184,6 +186,7 @@ def branch(leg: FiveBar | LegArrays, points: Points) -> Branch:
     A loop that is not quite closed is judged by C_right on E's side, by C_left elsewhere.
     """
     A, E = bases(leg)
+    # AF, not AC: with an extension side A is solved to the foot.
     s_A = np.sign(cross(points.F - A, points.B - A)).astype(int)
     s_E = np.sign(cross(points.C_right - E, points.D - E)).astype(int)
     assembly = np.sign(cross(points.D - points.B, points.C_left - points.B)).astype(int)

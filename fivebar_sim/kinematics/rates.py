@@ -61,11 +61,13 @@ def jacobian(leg: FiveBar, theta: ArrayLike, assembly: int | None = None) -> Arr
     BC = p.C_left - p.B
     DC = p.C_right - p.D
     CF = p.F - p.C_left
+    # At m = 0 the two circles about B and D touch, and C can leave both ways.
     m = cross(BC, DC)
     _refuse(m / (leg.L2 * leg.L3), "B, C and D are in line")
 
     dC_A = (cross(AB, BC) / m)[..., None] * -perp(DC)
     dC_E = (cross(ED, DC) / m)[..., None] * perp(BC)
+    # Beyond C the foot is carried along by the turn of L2.
     psi_A = cross(BC, dC_A - perp(AB)) / leg.L2**2
     psi_E = cross(BC, dC_E) / leg.L2**2
     dF_A = dC_A + psi_A[..., None] * perp(CF)
@@ -110,6 +112,7 @@ def joint_motion(
     rho, phi = foot_radius_and_angle(leg)
     theta = inverse(leg, F, mode)
     AB = leg.L1 * unit(theta[..., 0])
+    # Side A first: it fixes B and L2, hence C, whose motion is what side E has to follow.
     BF = F - A - AB
     A_dot, A_ddot = _side_motion(AB, BF, F_dot, F_ddot, "A, B and F are in line")
     BC = (leg.L2 / rho) * turned(BF, -phi)
@@ -121,6 +124,7 @@ def joint_motion(
     E_dot, E_ddot = _side_motion(ED, DC, C_dot, C_ddot, "E, D and C are in line")
 
     q = (theta[..., 0], angle_between(AB, BC), theta[..., 1], angle_between(ED, DC))
+    # Knee angles are relative to the inner link, so their rates are differences.
     q_dot = (A_dot[0], A_dot[1] - A_dot[0], E_dot[0], E_dot[1] - E_dot[0])
     q_ddot = (A_ddot[0], A_ddot[1] - A_ddot[0], E_ddot[0], E_ddot[1] - E_ddot[0])
 
@@ -143,6 +147,7 @@ def _side_motion(r1: Array, r2: Array, v: Array, a: Array, where: str) -> tuple[
     _refuse(k / np.sqrt(dot(r1, r1) * dot(r2, r2)), where)
     rate_1 = dot(r2, v) / k
     rate_2 = -dot(r1, v) / k
+    # The centripetal part is known once the rates are: what is left is linear.
     w = a + r1 * (rate_1**2)[..., None] + r2 * (rate_2**2)[..., None]
     return (rate_1, rate_2), (dot(r2, w) / k, -dot(r1, w) / k)
 
@@ -156,6 +161,7 @@ def _end_motion(r1: Array, r2: Array, rate: Pair, accel: Pair) -> tuple[Array, A
 
 def _refuse(sine: Array, where: str) -> None:
     """Raise if the sine of the angle between two links is no more than rounding."""
+    # Written so that NaN is singular too.
     singular = ~(np.abs(sine) > SINGULAR)
     if singular.any():
         index = first_index(singular)

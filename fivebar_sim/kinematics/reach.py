@@ -45,6 +45,7 @@ def _side_angle(x: Array, z: Array, near: float, far: float, s: int) -> tuple[Ar
     d2 = x * x + z * z
     low = (near - far) ** 2
     high = (near + far) ** 2
+    # Factored: a difference of two squares would lose digits.
     N = d2 + (near - far) * (near + far)
     S = s * np.sqrt(np.maximum((high - d2) * (d2 - low), 0.0))
     theta = direction(z * N + S * x, x * N - S * z)
@@ -146,6 +147,7 @@ def out_of_reach(leg: FiveBar, foot: Array, theta: Array, ok: Bools) -> Unreacha
     rho, phi = foot_radius_and_angle(leg)
     F = foot[index]
 
+    # Side A is named first, since E's end C is known only where A reaches.
     if not ok[index][0]:
         what = "|AF|"
         near = leg.L1
@@ -228,12 +230,15 @@ def inverse_nearest(leg: FiveBar, foot: ArrayLike, theta_now: ArrayLike) -> Arra
     if not np.isfinite(now).all():
         raise ArgumentError("theta_now must be finite [rad]")
 
+    # Wrapped differences, so that a motor beyond half a turn is not unwound.
     step = wrap(inverse_all(leg, foot) - now[..., None, :])
     cost = np.sum(step**2, axis=-1)
     lost = np.isnan(cost).all(axis=-1)
     if lost.any():
+        # No mode reaches there, so the leg's own tells why as well as any.
         theta, ok = solve(leg, foot, leg.mode)
         raise out_of_reach(leg, foot, theta, ok | ~lost[..., None])
 
+    # argmin takes NaN for the least.
     best = np.argmin(np.where(np.isnan(cost), np.inf, cost), axis=-1)
     return now + np.take_along_axis(step, best[..., None, None], axis=-2)[..., 0, :]

@@ -131,6 +131,7 @@ class FootPath(
         """
         t = times(time, self.end)
         s, s_dot, s_ddot = (rate[..., None] for rate in eased(t, self.ramp))
+        # Chain rule: the path as a curve, run through at its own time s(t).
         p = self.nominal(s[..., 0])
         return Sample(
             position=p.position,
@@ -201,6 +202,7 @@ def times(time: ArrayLike, end: float) -> Array:
         t = np.asarray(time, dtype=np.float64)
     except (TypeError, ValueError) as error:
         raise ArgumentError(f"time must be numbers [s]: {error}") from None
+    # Written so that NaN is bad too.
     bad = ~((t >= 0.0) & (t <= end * (1.0 + TIME_ROUNDING)) & (t < math.inf))
     if bad.any():
         i = first_index(bad)
@@ -219,6 +221,7 @@ def eased(time: Array, ramp: float) -> tuple[Array, Array, Array]:
         time: t >= 0 [s], any shape.
         ramp: T >= 0 [s].
     """
+    # tau would be 0 / 0.
     if ramp == 0.0:
         return time, np.ones_like(time), np.zeros_like(time)
     tau = np.minimum(time, ramp) / ramp

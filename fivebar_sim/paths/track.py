@@ -101,6 +101,7 @@ def _lines(file: Path, what: str) -> list[tuple[int, list[str]]]:
         raise ConfigError(f"cannot read {what} {file}: {error.strerror}") from None
 
     try:
+        # -sig: spreadsheets put a byte order mark in front.
         text = raw.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         number = raw.count(b"\n", 0, error.start) + 1
@@ -122,6 +123,7 @@ def _columns(header: list[str], headers: Headers, where: str) -> tuple[list[int]
             return [header.index(name) for name in legal], scale
 
     known = {name for legal in headers for name in legal}
+    # The legal header that shares most columns is the one that was meant.
     nearest = max(headers, key=lambda legal: len(set(legal) & set(header)))
     strange = [name for name in header if name not in known]
     missing = [name for name in nearest if name not in header]
@@ -144,9 +146,11 @@ def _legal(headers: Headers) -> str:
 def _number(cell: str, column: str, where: str) -> float:
     """Return a cell as a finite number."""
     try:
+        # Python reads 1_000 as a number; spreadsheets do not.
         value = math.nan if "_" in cell else float(cell)
     except ValueError:
         value = math.nan
+    # Refuses NaN as well.
     if not abs(value) <= LARGEST:
         legal = f"[{-LARGEST:g}, {LARGEST:g}]"
         raise ConfigError(f"{where}: {column} must be a number in {legal}, got {cell!r}")

@@ -43,6 +43,7 @@ def spans(radius: float, base: float, low: float, high: float) -> list[tuple[flo
     slack = EXACT * far
     if not (low <= far + slack and high >= near - slack):
         return []
+    # A circle about the origin, or base 0: one distance for all angles.
     if near == far:
         return [(-np.pi, np.pi)]
 
@@ -51,6 +52,7 @@ def spans(radius: float, base: float, low: float, high: float) -> list[tuple[flo
     cosine2 = (far - r) * (far + r)
     halves = np.arctan2(np.sqrt(np.maximum(sine2, 0.0)), np.sqrt(np.maximum(cosine2, 0.0)))
     first, last = (2.0 * halves).tolist()
+    # The two intervals, mirror images about the axis, meet at 0 or at pi: then they are one.
     if first == 0.0:
         return [(-last, last)]
     if last == np.pi:
@@ -128,6 +130,7 @@ def _part_double_roots(bar: FourBar, q: Array, f: Callable[[Array], Array]) -> A
 
 def runs(q: Array, chosen: Bools) -> list[Array]:
     """Return the pieces of a polyline whose segments (n - 1,) are chosen; a closed one may wrap."""
+    # Compared as directions, since a whole turn of the crank adds 2 pi.
     closed = np.allclose(np.exp(1j * q[0]), np.exp(1j * q[-1]), rtol=0, atol=1e-9)
     if closed and not chosen.all() and chosen[0] and chosen[-1]:
         first = int(np.argmin(chosen))  # begin in a gap

@@ -43,7 +43,9 @@ def gathered(pieces: list[tuple[FourBar, Array]]) -> Curves:
     count = np.array([len(q) for _, q in pieces], dtype=np.intp)
     stop = np.cumsum(count)
     ends = np.stack([stop - count, stop], axis=-1)
+    # The last pose of each piece starts no segment.
     first = np.delete(np.arange(int(count.sum())), stop - 1)
+    # A workspace may have no coupler curve: concatenate needs at least one array.
     empty = np.zeros((0, 2))
     q = np.concatenate([empty, *(q[:-1] for _, q in pieces)])
     dq = np.concatenate([empty, *(np.diff(q, axis=0) for _, q in pieces)])

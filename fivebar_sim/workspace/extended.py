@@ -117,9 +117,11 @@ class Extended(NamedTuple):
         owner, c, b = _candidates(self, p)
         base = b[owner]
         far = p[owner]
+        # Differences of distances, not distances: those of far points differ by rounding only.
         total = np.abs(far - base) + np.abs(far - c)
         gain = (np.conj(c - base) * (2.0 * far - base - c)).real
         gain /= np.where(total > 0.0, total, 1.0)
+        # The best of each point's candidates, in one pass without sorting.
         most = np.full(len(p), -np.inf)
         np.maximum.at(most, owner, gain)
         if np.isinf(most).any():
@@ -199,6 +201,7 @@ def region(leg: FiveBar, elbow: int) -> Extended:
     outer = Circle(leg.L1 + rho, leg.L1 + leg.L2 * rho / offset)
     inward = 1.0 if leg.L1 >= rho else -1.0
     inner = Circle(abs(leg.L1 - rho), inward * (leg.L1 - leg.L2 * rho / offset))
+    # Squares, as in `reaches`: both must call the same hole rounding.
     holed = inner.radius**2 > ROUNDING * outer.radius**2
     curves = _curves(leg, elbow, bar, low, high)
 
@@ -221,6 +224,7 @@ def _curves(leg: FiveBar, elbow: int, bar: FourBar, low: float, high: float) -> 
     def within(q: Array) -> Array:
         return low + slack - np.abs(bar.other_elbow(q) - bar.base)
 
+    # Without an inner circle E's reach has no inside that C could fall into.
     tests = (bent,) if elbow else (within, beyond) if low > 0.0 else (beyond,)
     pieces: list[tuple[FourBar, Array]] = []
     for rocker in _rockers(leg, low, high):
@@ -266,6 +270,7 @@ def _candidates(region: Extended, p: Complex) -> tuple[Rows, Complex, Complex]:
     c = []
     length = np.abs(p)
     off = length > ROUNDING * region.scale
+    # From A itself every direction is as near: any will do.
     ray = np.where(off, p, -1.0) / np.where(off, length, 1.0)
 
     for circle in region.circles:

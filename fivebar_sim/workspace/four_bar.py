@@ -59,6 +59,7 @@ class FourBar(NamedTuple):
         """Return G [m^2], (...), and dG/dq, (..., 2)."""
         B, C, _ = self.joints(q)
         r = C - self.base
+        # Factored: the difference of squares would lose the digits that Newton needs.
         gap = 0.5 * (np.abs(r) - self.rocker) * (np.abs(r) + self.rocker)
         return gap, np.stack([self.base * C.imag, -(np.conj(r) * (C - B)).imag], axis=-1)
 
@@ -70,6 +71,7 @@ class FourBar(NamedTuple):
         for _ in range(3):  # each squares the relative gap, first 1e-3
             gap, slope = self.gradient(q)
             square = _norm2(slope)
+            # A pose that is on the curve to rounding stays: a step there would only add noise.
             off = (np.abs(gap) > rounding) & (square > 0.0)
             step = np.where(off, gap / np.where(off, square, 1.0), 0.0)
             q = q - step[..., None] * slope
@@ -80,6 +82,7 @@ class FourBar(NamedTuple):
         """Return dF of one radian along the curve, in the sense of the chord dq, [m], (...)."""
         _, slope = self.gradient(q)
         tangent = np.stack([-slope[..., 1], slope[..., 0]], axis=-1)
+        # At a double point dG/dq is 0 and has no direction: the chord stands in for it.
         steep = _norm2(slope) > (EXACT * self.scale**2) ** 2
         tangent = np.where(steep[..., None], tangent, dq)
         length = np.sqrt(_norm2(tangent))

@@ -144,6 +144,7 @@ class Rings(NamedTuple):
 
         for c, on_boundary in self._candidates(p):
             d = _norm(p - c)
+            # Compared with both distances: far points have coarser last places.
             nearer = dot(c - best, (p - best) + (p - c)) > rounding * (d + d_best)
             take = on_boundary & (nearer | ~found)
             best[take] = c[take] if c.ndim == 2 else c
@@ -181,6 +182,7 @@ class Rings(NamedTuple):
         for ring, other in ((self.left, self.right), (self.right, self.left)):
             r = p - ring.centre
             length = _norm(r)[:, None]
+            # From the centre every direction is as near: take the one away from the other ring.
             off_centre = length > ROUNDING * ring.radii[-1]
             ray = np.where(off_centre, r, ring.away) / np.where(off_centre, length, 1.0)
             for radius in ring.radii:

@@ -26,14 +26,17 @@ def crossing(f: Callable[[Array], Array], f_0: Array, f_1: Array) -> Array:
     f_b = f_1
 
     for _ in range(STEPS):
+        # Regula falsi: it keeps the root between its ends, whatever the functions do.
         new = b - f_b * (b - a) / np.where(f_b == f_a, 1.0, f_b - f_a)
         f_new = f(new)
         flips = f_new * f_b < 0.0
         a = np.where(flips, b, a)
+        # Halving the value of an end that stays makes it converge faster than linearly.
         f_a = np.where(flips, f_b, 0.5 * f_a)
         moved = np.abs(new - b)
         b = new
         f_b = f_new
+        # A place in [0, 1] has no more digits.
         if not (moved > 1e-15).any():
             break
     return b
