@@ -36,6 +36,7 @@ def as_vectors(values: ArrayLike, name: str, size: int) -> Array:
         vectors = np.asarray(values, dtype=np.float64)
     except (TypeError, ValueError) as error:
         raise ArgumentError(f"{name} must be numbers of shape (..., {size}): {error}") from None
+    # A scalar has no last axis to look at.
     if vectors.ndim == 0 or vectors.shape[-1] != size:
         raise ArgumentError(f"{name} must have shape (..., {size}), got {vectors.shape}")
     return vectors
@@ -50,7 +51,7 @@ def finite(values: Array, name: str) -> Array:
     """Return the values.
 
     Raises:
-        ArgumentError: Unless all are finite; says where.
+        ArgumentError: Unless all are finite; names the first index.
     """
     good = np.isfinite(values)
     if not good.all():
@@ -62,7 +63,7 @@ def together(**arrays: Array) -> list[Array]:
     """Return the arrays broadcast to one shape.
 
     Raises:
-        ArgumentError: If their shapes do not fit; says which came.
+        ArgumentError: If their shapes do not fit; names them.
     """
     try:
         return list(np.broadcast_arrays(*arrays.values()))

@@ -14,9 +14,11 @@ LARGEST = sys.float_info.max
 
 
 def is_finite(value: Any) -> bool:
-    """Return whether value is a real number that a float can hold; a bool is none."""
+    """Return whether value is a real number that a float can hold; bools are rejected."""
+    # bool is a subclass of int.
     if not isinstance(value, (int, float, np.number)) or isinstance(value, bool):
         return False
+    # A comparison is False for NaN, and works for integers that no float can hold.
     return bool(-LARGEST <= value <= LARGEST)
 
 
@@ -35,7 +37,7 @@ def check_number(
     Args:
         key: What the number is called; the message starts with it.
         value: What came.
-        unit: Of the range in the message; "" for a pure number.
+        unit: Unit of the range in the message; "" for a pure number.
         low: Least legal value.
         high: Greatest legal value.
         strict: Whether the ends are excluded.

@@ -46,7 +46,7 @@ class SingularError(PoseError):
 
 
 class ConfigError(FiveBarError, ValueError):
-    """A scenario, leg or path file that says something illegal; the message names file and key."""
+    """A scenario, leg or path file with an illegal value; the message names file and key."""
 
 
 class DivergedError(FiveBarError, RuntimeError):

@@ -118,12 +118,12 @@ class FiveBar:
         mass: Masses of L1..L4 [kg], or None for capsules.
         com: Centres along L1..L4 [m], only with `mass`.
         inertia: Inertias of L1..L4 about their centres [kg m^2], only with `mass`.
-        radius: Of the capsules [m]; with `mass` given it is only drawn.
-        density: Of capsules and foot [kg/m^3].
-        foot_radius: Of the ball at F [m].
+        radius: Radius of the capsules [m]; with `mass` given it is only drawn.
+        density: Density of capsules and foot [kg/m^3].
+        foot_radius: Radius of the ball at F [m].
         armature: Rotor inertia of each motor, reflected to A and E [kg m^2].
         gravity: (x, z) in the hip frame [m/s^2].
-        name: What tables and pictures call the leg.
+        name: Name in tables and pictures.
     """
 
     L1: float = 0.040

@@ -23,7 +23,7 @@ class Sim(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True)
     Attributes:
         timestep: h [s].
         integrator: MuJoCo's integrator, "discrete" or "implicitfast".
-        seed: Of everything random in a run, as the sensors' noise.
+        seed: Seed of all random numbers in a run, such as the sensors' noise.
     """
 
     timestep: float = 0.001

@@ -70,8 +70,8 @@ def build(
             return spec.compile()
     except ValueError as error:
         # MuJoCo's messages span lines; ours are one line.
-        said = " ".join(str(error).split())
-        raise GeometryError(f"MuJoCo refuses leg {leg.name!r}: {said}") from None
+        message = " ".join(str(error).split())
+        raise GeometryError(f"MuJoCo refuses leg {leg.name!r}: {message}") from None
 
 
 @contextmanager

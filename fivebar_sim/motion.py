@@ -108,7 +108,7 @@ def edge_margin(leg: FiveBar) -> float:
 
         l + m - sqrt(l^2 + m^2 + 2 l m cos g)   and   sqrt(l^2 + m^2 - 2 l m cos g) - |l - m|
 
-    but the first alone for l = m: such a side folds on its motor's axis, which is no edge.
+    but the first alone for l = m: such a side folds onto its motor's axis, inside the workspace.
 
     Args:
         leg: The leg; L6 = 0.

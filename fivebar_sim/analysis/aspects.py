@@ -93,7 +93,7 @@ def aspect(
         leg: The leg.
         theta: (theta_A, theta_E) [rad], (..., 2).
         assembly: +1 or -1; None is the leg's own.
-        cells: Of the grids along each angle; the cost grows with the square.
+        cells: Grid cells along each angle; the cost grows with the square.
 
     Raises:
         LoopOpenError: Where the links do not meet.
@@ -112,7 +112,7 @@ def aspect_at(
         leg: The leg.
         foot: F [m], hip frame, (..., 2).
         mode: Working mode (s_A, s_E); None is the leg's own.
-        cells: Of the grids along each angle.
+        cells: Grid cells along each angle.
 
     Raises:
         UnreachableError: Where the foot is out of reach.
@@ -129,14 +129,14 @@ def same_aspect(
     """Return where the foot gets from p to q in one working mode without meeting a singularity.
 
     True: a chain of poses of one triple was found, each linked to the next. False: none was, which
-    is no proof where a neck may be thinner than a cell.
+    proves nothing where a neck may be thinner than a cell.
 
     Args:
         leg: The leg.
         p: F [m], hip frame, (..., 2).
         q: F [m], hip frame, broadcasts with p.
         mode: Working mode (s_A, s_E); None is the leg's own.
-        cells: Of the grids along each angle.
+        cells: Grid cells along each angle.
 
     Raises:
         UnreachableError, SingularError, ArgumentError: As `aspect_at`, for p or for q; and for

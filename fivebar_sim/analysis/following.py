@@ -128,7 +128,7 @@ def path_report(
     Args:
         leg: The leg.
         foot: F [m], hip frame, (N, 2).
-        time: Of each point [s], rising, (N,).
+        time: Time of each point [s], rising, (N,).
         mode: Working mode (s_A, s_E), one or of each point (N, 2), as in `Followed`; None is the
             leg's own.
 
@@ -160,6 +160,7 @@ def _nearest_rows(first: Array, every: Array) -> list[int]:
     The best next row is found for all four rows at once; the chain of choices is then a walk
     through a table.
     """
+    # Costs between all modes of neighbouring points at once; only the walk is a loop.
     before = np.concatenate([np.broadcast_to(first, (1, 4, 2)), every[:-1]])
     cost = np.sum(wrap(every[:, None, :, :] - before[:, :, None, :]) ** 2, axis=-1)
     cost = np.where(np.isnan(cost), np.inf, cost)  # (point, row before, row)
@@ -178,6 +179,7 @@ def _closest(distance: Array, zero: float, time: Array) -> Closest:
     i = int(np.argmin(np.abs(distance)))
     d_1 = distance[:-1]
     d_2 = distance[1:]
+    # Linear between two points: no more is known there.
     k = np.flatnonzero(np.sign(d_1) * np.sign(d_2) < 0.0)
     between = time[k] + np.diff(time)[k] * d_1[k] / (d_1[k] - d_2[k])
     met = np.concatenate([time[np.abs(distance) <= zero], between])
@@ -216,7 +218,7 @@ def _modes(mode: Mode | ArrayLike, count: int) -> list[Mode]:
 
 
 def _refuse_lost(leg: FiveBar, path: Array, lost: Bools, modes: list[Mode]) -> None:
-    """Raise for the first point that is out of reach, as `inverse` says it."""
+    """Raise for the first point that is out of reach, with the error of `inverse`."""
     for i in np.flatnonzero(lost)[:1].tolist():
         try:
             inverse(leg, path[i], modes[i])

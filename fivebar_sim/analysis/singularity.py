@@ -52,9 +52,9 @@ class Distances(NamedTuple):
     """Signed distances from the three kinds of singularity [m], each of shape (...).
 
     Attributes:
-        side_A: Of A, B, F from being in line; has the sign of s_A.
-        side_E: Of E, D, C from being in line; has the sign of s_E.
-        loop: Of B, C, D from being in line; has the sign of the assembly mode.
+        side_A: Distance of A, B, F from being in line; has the sign of s_A.
+        side_E: Distance of E, D, C from being in line; has the sign of s_E.
+        loop: Distance of B, C, D from being in line; has the sign of the assembly mode.
     """
 
     side_A: Array

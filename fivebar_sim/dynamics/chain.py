@@ -39,7 +39,7 @@ Vector = tuple[Scalar, Scalar]
 """(x, z), or (along, across) in a link's own frame."""
 
 Four = tuple[Scalar, Scalar, Scalar, Scalar]
-"""Of the links L1..L4."""
+"""One value for each of the links L1..L4."""
 
 
 def cross(a: Vector, b: Vector) -> Scalar:
@@ -89,12 +89,12 @@ class Chain:
         leg: The leg.
         assembly: +1 or -1.
         I1: Inertia about A of L1, of L2's mass at B, and of A's rotor [kg m^2].
-        I2: Of L2 about B [kg m^2].
-        I3: Of L3 about D [kg m^2].
+        I2: Inertia of L2 about B [kg m^2].
+        I3: Inertia of L3 about D [kg m^2].
         I4: Inertia about E of L4, of L3's mass at D, and of E's rotor [kg m^2].
         S1: Moment of L1 about A and of L2's mass at B [kg m].
-        S2: Of L2 about B [kg m].
-        S3: Of L3 about D [kg m].
+        S2: Moment of L2 about B [kg m].
+        S3: Moment of L3 about D [kg m].
         S4: Moment of L4 about E and of L3's mass at D [kg m].
         AE: From A to E [m].
         hung: Moment of A's masses at A and of E's at E about O, in the hip frame [kg m].

@@ -1,4 +1,4 @@
-"""What the closed chain's equation of motion says of given poses, rates and torques.
+"""The closed chain's equation of motion at given poses, rates and torques.
 
 Each function is the method of that name of `LegDynamics`, for a single question.
 """

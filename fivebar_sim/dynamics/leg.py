@@ -23,8 +23,8 @@ class Energy(NamedTuple):
     """The mechanical energy of poses in motion.
 
     Attributes:
-        kinetic: Of links, payload and rotors [J], (...).
-        potential: Of links and payload, zero if all were at O, the hip frame's origin [J], (...).
+        kinetic: Kinetic energy of links, payload and rotors [J], (...).
+        potential: That of links and payload, 0 with all at O, the hip frame's origin [J], (...).
     """
 
     kinetic: Array

@@ -68,7 +68,7 @@ def simulate(
         theta_dot: At t = 0 [rad/s], broadcasts with theta.
         timestep: h [s].
         steps: How many.
-        torque: Of the motors; None: they are free.
+        torque: Law of the motor torques; None: the motors are free.
         foot_force: What the world does to the foot; None: nothing.
         every: How many steps are between two rows of the result.
         assembly: +1 or -1; None is the leg's own.
@@ -81,7 +81,7 @@ def simulate(
         LoopOpenError: Where the links do not meet at t = 0.
         SingularError: Where B, C and D are in line at t = 0.
         DivergedError: A leg's loop opens or it becomes singular, a motor turns by more than
-            `TURN_MAX` in a step, or a law says NaN; `.time` is the start of that step.
+            `TURN_MAX` in a step, or a law returns NaN; `.time` is the start of that step.
         ArgumentError: As `inverse`; a timestep or numbers of steps that are not positive, a law
             whose result has the wrong shape.
     """
@@ -131,7 +131,7 @@ def integrate(
         theta_dot: At the first time [rad/s], (2,).
         times: Where the motion is wanted, rising [s], (N,); between two steps of the integrator it
             is interpolated at order 7.
-        torque: Of the motors, smooth in all arguments; None: they are free.
+        torque: Law of the motor torques, smooth in all arguments; None: the motors are free.
         foot_force: What the world does to the foot, as smooth; None: nothing.
         rtol: Relative error of a step, at least 2.3e-14.
         atol: Absolute error of a step [rad, rad/s].
@@ -141,7 +141,7 @@ def integrate(
     Raises:
         LoopOpenError: The links do not meet at times[0].
         SingularError: B, C and D are in line at times[0].
-        DivergedError: The motion runs into a singular pose, or a law says NaN; `.time` is how far
+        DivergedError: The motion runs into a singular pose, or a law gives NaN; `.time` is how far
             the integrator came.
         ArgumentError: As `simulate`; more than one leg, times that do not rise.
     """
@@ -192,12 +192,12 @@ class _Plant:
     def accelerations(self, t: float, q: Array, w: Array) -> Vector:
         """Return the two motor accelerations [rad/s^2]."""
         p = self.chain.pose(q[..., 0], q[..., 1])
-        tau = _told(self.torque, "torque", t, q, w) or (0.0, 0.0)
-        force = _told(self.foot_force, "foot_force", t, q, w)
+        tau = _evaluate(self.torque, "torque", t, q, w) or (0.0, 0.0)
+        force = _evaluate(self.foot_force, "foot_force", t, q, w)
         return self.chain.accelerations(p, (w[..., 0], w[..., 1]), tau, force)
 
     def slope(self, t: float, y: Array) -> Array:
-        """Return dy/dt of one leg's y = (theta, theta_dot); NaN where there is none.
+        """Return dy/dt of one leg's y = (theta, theta_dot); NaN where the loop is open or singular.
 
         A trial step beyond a fold of the loop is then refused by the error control, and shortened.
         """
@@ -208,19 +208,19 @@ class _Plant:
         return np.array([y[2], y[3], *alpha])
 
 
-def _told(law: Law | None, name: str, t: float, q: Array, w: Array) -> Vector | None:
-    """Return both coordinates of what a law says, or None without a law."""
+def _evaluate(law: Law | None, name: str, t: float, q: Array, w: Array) -> Vector | None:
+    """Return both coordinates of a law's value, or None without a law."""
     if law is None:
         return None
     value = as_pairs(law(t, q, w), name)
     if not np.isfinite(value).all():
         raise _UnfitError(f"{name} is not finite")
     if value.shape != q.shape:
-        value = _fitted(value, name, q.shape)
+        value = _broadcast(value, name, q.shape)
     return value[..., 0], value[..., 1]
 
 
-def _fitted(value: Array, name: str, shape: tuple[int, ...]) -> Array:
+def _broadcast(value: Array, name: str, shape: tuple[int, ...]) -> Array:
     """Return a law's result broadcast to the shape of the legs."""
     try:
         return np.broadcast_to(value, shape)
@@ -270,18 +270,18 @@ def _step(plant: _Plant, t: float, q: Array, w: Array, h: float) -> tuple[Array,
     # q needs no slopes of its own: its rate in each stage is the stage's w.
     half = 0.5 * h
     w1 = w
-    alpha1 = _stacked(plant, t, q, w)
+    alpha1 = _stack_accelerations(plant, t, q, w)
     w2 = w + half * alpha1
-    alpha2 = _stacked(plant, t + half, q + half * w1, w2)
+    alpha2 = _stack_accelerations(plant, t + half, q + half * w1, w2)
     w3 = w + half * alpha2
-    alpha3 = _stacked(plant, t + half, q + half * w2, w3)
+    alpha3 = _stack_accelerations(plant, t + half, q + half * w2, w3)
     w4 = w + h * alpha3
-    alpha4 = _stacked(plant, t + h, q + h * w3, w4)
+    alpha4 = _stack_accelerations(plant, t + h, q + h * w3, w4)
     q = q + h / 6.0 * (w1 + 2.0 * (w2 + w3) + w4)
     return q, w + h / 6.0 * (alpha1 + 2.0 * (alpha2 + alpha3) + alpha4)
 
 
-def _stacked(plant: _Plant, t: float, q: Array, w: Array) -> Array:
+def _stack_accelerations(plant: _Plant, t: float, q: Array, w: Array) -> Array:
     """Return the accelerations of all legs, (..., 2)."""
     return np.stack(plant.accelerations(t, q, w), axis=-1)
 
@@ -317,7 +317,7 @@ def _diverged(time: float, why: str) -> DivergedError:
 
 
 def _start(theta: ArrayLike, theta_dot: ArrayLike) -> tuple[Array, Array]:
-    """Return a finite state; ArgumentError if it is none."""
+    """Return the state as finite arrays; ArgumentError if it is not finite."""
     q, w = together(
         theta=finite(as_pairs(theta, "theta"), "theta"),
         theta_dot=finite(as_pairs(theta_dot, "theta_dot"), "theta_dot"),

@@ -105,7 +105,7 @@ def soft_loop(
         q: (theta_A, theta_B, theta_E, theta_D) of the closed loop at the times k h [rad],
             k = 0..N, (N + 1, 4).
         timestep: h [s].
-        damping: Of the joints A and E [N m s/rad].
+        damping: Damping of the joints A and E [N m s/rad].
         payload: Point mass at F [kg].
 
     Returns:
@@ -158,7 +158,7 @@ class _Steps(NamedTuple):
 
 
 def _rows(q: ArrayLike) -> Array:
-    """Return rows of joint angles; ArgumentError if they are none."""
+    """Return rows of joint angles; ArgumentError unless there are two or more."""
     rows = finite(as_vectors(q, "q", 4), "q")
     if rows.ndim < 2 or rows.shape[-2] < 2:
         raise ArgumentError(f"q must have shape (..., N + 1, 4) with N >= 1, got {rows.shape}")

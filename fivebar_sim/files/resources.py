@@ -15,6 +15,7 @@ def folder(name: str) -> Path:
     Raises:
         FileNotFoundError: If the installation lacks it.
     """
+    # Inside the package once installed, beside it in a checkout.
     for base in (PACKAGE, PACKAGE.parent):
         if (base / name).is_dir():
             return base / name

@@ -155,7 +155,7 @@ def bounds(
     """Return a table of limits as (low, high) by dotted key; one number is an upper bound.
 
     Args:
-        table: What the file says under `name`, nested, dotted or quoted.
+        table: What the file has under `name`, nested, dotted or quoted.
         known: The keys that may be limited.
         name: The table's key, for messages.
         where: The file, for messages.
@@ -204,7 +204,7 @@ def convert(table: Any, kind: type[T], name: str, where: str) -> T:
     """Return a table as a Struct of the given kind.
 
     Args:
-        table: What the file says under `name`.
+        table: What the file has under `name`.
         kind: A Struct without Structs in it.
         name: The table's key, for messages.
         where: The file, for messages.

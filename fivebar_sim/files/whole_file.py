@@ -1,6 +1,6 @@
 """Files that are written whole or not at all: beside their place first, then renamed to it.
 
-A path in a text that is no UTF-8 is told with backslashes.
+A path that is not UTF-8 is written with backslashes.
 """
 
 from __future__ import annotations
@@ -46,11 +46,13 @@ def beside(path: Path) -> Iterator[Path]:
     """
     try:
         _check_free(path)
+        # Beside the target, on one file system: only there is a rename atomic.
         handle, name = tempfile.mkstemp(prefix=".fivebar-", suffix=path.suffix, dir=path.parent)
         os.close(handle)
         stage = Path(name)
         try:
             yield stage
+            # mkstemp makes files that only their owner can read.
             stage.chmod(0o644)
             stage.replace(path)
         finally:

@@ -159,7 +159,7 @@ class FootPath(
         """Return the path with its files read and checked; names are relative to folder.
 
         Raises:
-            ConfigError: A file that cannot be read or says something illegal.
+            ConfigError: A file that cannot be read or holds an illegal value.
         """
         del folder  # only the kinds that read a file need it
         return self
@@ -252,7 +252,7 @@ def check_pair(
     Args:
         spec: What has the key.
         key: Its name; messages start with it.
-        unit: Of both numbers, for messages.
+        unit: Unit of both numbers, for messages.
         high: Upper end of their size.
         positive: Whether both must be above 0.
 

@@ -81,6 +81,7 @@ class Csv(FootPath, frozen=True, tag="csv", dict=True):
         """
         spline, _, period = self._curve
         t = self._times(time)
+        # A periodic spline repeats by itself, but loses digits far out.
         t = t if period is None else np.mod(t, period)
         return Sample(spline(t), spline(t, 1), spline(t, 2))
 
@@ -92,6 +93,7 @@ class Csv(FootPath, frozen=True, tag="csv", dict=True):
                 number), the period does not fit the points, or the path ends within the ramp.
         """
         bound = msgspec.structs.replace(self, file=str((folder / self.file).absolute()))
+        # Read now, so that a bad file is refused before the run and not during it.
         _ = bound._curve
         return bound
 
@@ -116,6 +118,7 @@ def _closed(track: Track, period: float | None, where: str) -> Track:
     """Return a track whose last point is its first, one period later."""
     time, foot = track
     span = track.span
+    # True counts as 1: a last point that repeats the first is not one more.
     distinct = len(time) - track.closed
     if distinct < 3:
         raise ConfigError(
@@ -127,6 +130,7 @@ def _closed(track: Track, period: float | None, where: str) -> Track:
 
     same = math.isclose(period, span, rel_tol=TIME_ROUNDING)
     if same and track.closed:
+        # The periodic spline wants both ends equal to the last bit.
         return Track(time, np.concatenate([foot[:-1], foot[:1]]))
 
     if same or not period > span:

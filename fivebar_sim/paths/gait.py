@@ -99,6 +99,7 @@ class Gait(Cyclic, frozen=True, tag="gait"):
         duty = self.duty
         half = 0.5 * self.stride
         stands = cycle < duty
+        # Both halves are computed for all times; where it stands the swing is not used.
         swing = np.maximum(cycle, duty)
         cx, cz = self.centre
         slope = -self.stride / duty

@@ -65,8 +65,10 @@ class Lines(FootPath, frozen=True, kw_only=True, tag="lines"):
         t = self._times(time)
         knots = self._knots()
         points = np.array(self.points)
+        # Clipped, so that the last knot belongs to the last line.
         k = np.clip(np.searchsorted(knots, t, side="right") - 1, 0, len(knots) - 2)
         speed = np.diff(points, axis=0) / np.diff(knots)[:, None]
+        # Past the end the foot stands on the last point itself, without rounding.
         held = (t >= knots[-1])[..., None]
         position = points[k] + speed[k] * (t - knots[k])[..., None]
 

@@ -37,6 +37,7 @@ def pieces(knots: list[Knot], t: Array) -> tuple[Array, Array, Array]:
     t0, p0, v0, a0 = knot[:-1].T
     t1, p1, v1, a1 = knot[1:].T
     T = t1 - t0
+    # What the start alone would miss at the end: the three upper coefficients make it good.
     P = p1 - p0 - v0 * T - 0.5 * a0 * T**2
     V = v1 - v0 - a0 * T
     A = a1 - a0
@@ -51,6 +52,7 @@ def pieces(knots: list[Knot], t: Array) -> tuple[Array, Array, Array]:
     c3 = c3[k]
     c4 = c4[k]
     c5 = c5[k]
+    # Horner's rule.
     p = p0[k] + r * (v0 + r * (0.5 * a0 + r * (c3 + r * (c4 + r * c5))))
     v = v0 + r * (a0 + r * (3.0 * c3 + r * (4.0 * c4 + r * 5.0 * c5)))
     a = a0 + r * (6.0 * c3 + r * (12.0 * c4 + r * 20.0 * c5))

@@ -97,6 +97,7 @@ class Line(Cyclic, frozen=True, tag="line"):
         stop = np.array(self.stop)
         span = stop - start
         # from the nearer end: exact at both
+        # Measured from the nearer end, so that both ends are met to the last bit.
         position = np.where(tau < 0.5, start + span * h, stop - span * (1.0 - h))
 
         return Sample(position, span * dh * tau_dot, span * ddh * tau_dot**2)

@@ -57,7 +57,7 @@ def read_track(file: Path, headers: Headers, what: str) -> Track:
 
     Raises:
         ConfigError: The file cannot be read, is not UTF-8, has another header, a row with the wrong
-            number of cells, a cell that is no finite number, times that do not grow by at least
+            number of cells, a cell that is not a finite number, times that do not grow by at least
             `SHORTEST`, or one row.
     """
     lines = _lines(file, what)

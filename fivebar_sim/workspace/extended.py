@@ -47,7 +47,7 @@ class Circle(NamedTuple):
 
     Attributes:
         radius: |AF| [m].
-        C: Of the pose with F in direction 0 [m].
+        C: Joint C in the pose with F in direction 0 [m].
     """
 
     radius: float
@@ -82,7 +82,7 @@ class Extended(NamedTuple):
         return self.circles[-1].radius
 
     def holds(self, points: Array) -> Bools:
-        """Return where the elbow, or either, reaches: as `kinematics.inverse_all` says."""
+        """Return where the elbow, or either, reaches: as `kinematics.inverse_all` decides."""
         modes = [k for k, mode in enumerate(MODES) if self.elbow in (0, mode[0])]
         theta_A = inverse_all(self.leg, points)[..., modes, 0]
         return np.asarray(np.isfinite(theta_A).any(axis=-1))
@@ -171,7 +171,7 @@ def to_hip(leg: FiveBar, z: Complex) -> Array:
 
 
 def _reach(leg: FiveBar) -> tuple[float, float]:
-    """Return the radii of E's reach [m]; a hole that `reaches` takes for rounding is none."""
+    """Return the radii of E's reach [m]; 0 inside for a hole within rounding."""
     inner = abs(leg.L4 - leg.L3)
     outer = leg.L4 + leg.L3
     return (inner if inner**2 > ROUNDING * outer**2 else 0.0), outer

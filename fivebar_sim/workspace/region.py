@@ -51,6 +51,7 @@ def reachable(
     foot = as_pairs(foot, "foot")
     with np.errstate(over="ignore", invalid="ignore"):  # a square of 1e200 m is as far as inf
         held = np.asarray(_region(leg, margin if leg.L6 == 0.0 else 0.0, mode).holds(foot))
+    # Rings shrink by a margin exactly; coupler curves do not, so distances are measured.
     if margin > 0.0 and leg.L6 > 0.0 and held.any():
         held[held] = distance(leg, foot[held], mode=mode) >= margin
     return held
@@ -95,6 +96,7 @@ def nearest(
         best = p.copy()
         lost = ~whole.holds(p)
         if lost.any():
+            # A boundary point may be out of reach by rounding: it is moved until it is within.
             best[lost] = _settled(whole, whole.boundary_point(p[lost]))
         return best
 

@@ -41,7 +41,7 @@ class Ring(NamedTuple):
     """Where one side chain reaches.
 
     Attributes:
-        centre: Of the two circles [m], (2,).
+        centre: Common centre of the two circles [m], (2,).
         near: Link at the motor [m].
         far: Link beyond the knee [m].
         away: Direction taken for points on the centre: away from the other motor; down if coaxial.
@@ -54,7 +54,7 @@ class Ring(NamedTuple):
 
     @property
     def radii(self) -> tuple[float, ...]:
-        """Radii of the circles [m], inner first; a hole that `holds` takes for rounding is none."""
+        """Radii of the circles [m], inner first; without a hole that is mere rounding."""
         inner = abs(self.near - self.far)
         outer = self.near + self.far
         return (inner, outer) if inner**2 > ROUNDING * outer**2 else (outer,)
@@ -72,7 +72,7 @@ class Ring(NamedTuple):
     def shrunk(self, margin: float) -> Ring:
         """Return the ring of the points that are at least margin [m] inside, as one of two links.
 
-        The sum of the links is less by the margin, and their difference more, unless it is none.
+        The sum of the links is less by the margin; their difference, if there is a hole, is more.
         """
         long = max(self.near, self.far)
         short = min(self.near, self.far)
@@ -88,7 +88,7 @@ class Rings(NamedTuple):
         leg: The leg.
         left: The ring about A.
         right: The ring about E.
-        margin: By which the rings are shrunk [m].
+        margin: How much the rings are shrunk [m].
     """
 
     leg: FiveBar

@@ -44,6 +44,7 @@ def survey(leg: FiveBar, cells: int = CELLS) -> Map:
         cells: Grid points along x and along z.
     """
     A, _ = kinematics.bases(leg)
+    # A little more than the foot can ever reach, whatever the angles.
     reach = 1.05 * (leg.L1 + leg.L2 + leg.L6 + float(np.hypot(*A)))
     line = np.linspace(-reach, reach, cells)
     foot = np.stack(np.meshgrid(line, line), axis=-1)
