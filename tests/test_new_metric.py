@@ -45,7 +45,7 @@ def fivebar(tmp_path: Path) -> Program:
     tracking.write_text(f"{tracking.read_text()}\n\n{function}")
     catalogue = tmp_path / "fivebar_sim/metrics/catalogue.py"
     before, begin, after = catalogue.read_text().partition("CATALOGUE = (\n")
-    catalogue.write_text(before + begin + row + after)
+    catalogue.write_text(f"{before}{begin}{row},\n{after}")
 
     def program(*args: str) -> subprocess.CompletedProcess[str]:
         return subprocess.run(

@@ -23,10 +23,8 @@ from fivebar_sim.arrays import Array
 from fivebar_sim.dynamics.chain import Chain, Pose, Vector, placed
 from fivebar_sim.geometry import FiveBar
 from fivebar_sim.kinematics.planar import end_velocity
-from fivebar_sim.metrics.columns import JOINTS
+from fivebar_sim.metrics.columns import JOINTS, motors
 from fivebar_sim.metrics.ground import contact_radius
-
-"""The leg's joints in the order of qpos."""
 
 TINY = 1e-9
 """Turned over, this [J] is nothing: the imbalance of a leg that only stands says nothing."""
@@ -156,7 +154,7 @@ def balance(body: Body, record: Mapping[str, Array], steps: Steps) -> Balance:
     kinetic, potential = mechanical(
         body, m.q - 0.5 * h * m.v, m.v, m.hip - 0.5 * h * m.hip_dot, m.hip_dot
     )
-    torque = np.stack([record["torque_A"], record["torque_E"]], axis=-1)
+    torque = motors(record, "torque")
     foot = foot_rates(leg, m.q[:-1], m.w)
     none = np.zeros(len(m.w))
     ground = none

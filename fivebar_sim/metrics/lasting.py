@@ -7,6 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from fivebar_sim.arrays import Array, Bools
+from fivebar_sim.metrics.columns import motors
 
 WITHIN = 1.0
 """Over this time [s] clipped and chattering steps are added up; of a shorter run, over all."""
@@ -28,7 +29,7 @@ def chattering(record: Mapping[str, Array], command: int) -> Array:
     two commands one after the other: d = tau_k - tau_k-P of the other sign than P steps before, P
     the steps of a command.
     """
-    torque = np.stack([record["torque_A"], record["torque_E"]], axis=-1)
+    torque = motors(record, "torque")
     d = np.zeros_like(torque)
     d[command:] = torque[command:] - torque[:-command]
     d[np.abs(d) <= FAINT * np.abs(torque).max()] = 0.0

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 from fivebar_sim.arrays import Array, Bools, at, first_index
 from fivebar_sim.checks import check_number
 from fivebar_sim.errors import ArgumentError
+from fivebar_sim.metrics.columns import MOTORS
 
 TINY = 1e-6
 """Torque or work of at most this part of the window's largest counts as none: it is the rounding
@@ -23,8 +24,6 @@ LARGEST = 1e9
 
 BINS_MAX = 1000
 """Upper end of the number of phase bins."""
-
-MOTORS = ("A", "E")
 
 
 class _Steps(NamedTuple):

@@ -11,7 +11,7 @@ from fivebar_sim import kinematics
 from fivebar_sim.arrays import Array, Bools
 from fivebar_sim.geometry import FiveBar
 from fivebar_sim.metrics import catalogue, energy, ground, guards, load
-from fivebar_sim.metrics.columns import JOINT_COLUMNS
+from fivebar_sim.metrics.columns import JOINT_COLUMNS, MOTORS, motors
 from fivebar_sim.paths import Gait
 
 if TYPE_CHECKING:
@@ -88,10 +88,8 @@ def _load(
     window = scenario.window
     path = scenario.path
     h = scenario.sim.timestep
-    torque, theta = (
-        np.stack([record[f"{name}_A"], record[f"{name}_E"]], axis=-1)
-        for name in ("torque", "theta")
-    )
+    torque = motors(record, "torque")
+    theta = motors(record, "theta")
     turned = np.concatenate([start[None], theta])[window.start : window.stop + 1]
     begun = np.maximum(record["time"][window] - h, 0.0)  # when the steps began
     phase = stance = None
@@ -106,7 +104,7 @@ def _load(
 
     measured = load.measure(torque[window], turned, h, stance=stance, phase=phase)
     clipped = saturated[window].mean(axis=0).tolist()
-    return {**measured, "saturated": dict(zip("AE", clipped, strict=True))}
+    return {**measured, "saturated": dict(zip(MOTORS, clipped, strict=True))}
 
 
 def _branch(leg: FiveBar, record: Mapping[str, Array]) -> dict[str, Any]:

@@ -10,15 +10,12 @@ from fivebar_sim.control.servo import Drive, applied_torque
 from fivebar_sim.control.servo import saturated as clipped
 from fivebar_sim.errors import DivergedError
 from fivebar_sim.metrics import energy
-from fivebar_sim.metrics.columns import JOINT_COLUMNS, Record
+from fivebar_sim.metrics.columns import JOINT_COLUMNS, MOTOR_JOINTS, Record
 from fivebar_sim.metrics.tracking import left_path
 from fivebar_sim.scenario.scenes import Ground, Treadmill
 from fivebar_sim.simulation.measure import Unrecorded
 from fivebar_sim.simulation.plan import Plan
 from fivebar_sim.simulation.steps import States
-
-MOTORS = [0, 2]
-"""Where the four joints have A and E."""
 
 
 def columns(planned: Plan, states: States, begin: int = 0) -> Record:
@@ -66,7 +63,7 @@ def _before(planned: Plan, states: States, begin: int = 0) -> tuple[Array, Array
     """Return motor angles and rates before each step; the run starts at rest."""
     q, v, _ = _joints(states)
     q = np.concatenate([planned.motion.q[begin : begin + 1], q[:-1]])
-    return q[:, MOTORS], np.concatenate([np.zeros((1, 4)), v[:-1]])[:, MOTORS]
+    return q[:, MOTOR_JOINTS], np.concatenate([np.zeros((1, 4)), v[:-1]])[:, MOTOR_JOINTS]
 
 
 def _drive(planned: Plan) -> Drive:
@@ -82,8 +79,8 @@ def _torque(planned: Plan, states: States, begin: int) -> Array:
         scenario.sim.integrator,
         ctrl,
         *_before(planned, states, begin),
-        q_next[:, MOTORS],
-        v_next[:, MOTORS],
+        q_next[:, MOTOR_JOINTS],
+        v_next[:, MOTOR_JOINTS],
         _drive(planned),
     )
 
