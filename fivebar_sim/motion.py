@@ -81,7 +81,7 @@ def plan(
     time: Array = np.arange(steps + 1, dtype=np.float64) * timestep
     wanted = path.at(time)
     # Compared by identity below: only projected targets lose their analytic rates.
-    foot = _projected(leg, wanted, time) if path.outside == "nearest" else wanted
+    foot = _project(leg, wanted, time) if path.outside == "nearest" else wanted
     try:
         kinematics.inverse(leg, foot.position)
     except UnreachableError as error:
@@ -141,7 +141,7 @@ def rates(values: Array, timestep: float) -> tuple[Array, Array]:
     return (p[2:] - p[:-2]) / (2.0 * timestep), np.diff(p, 2, axis=0) / timestep**2
 
 
-def _projected(leg: FiveBar, wanted: Sample, time: Array) -> Sample:
+def _project(leg: FiveBar, wanted: Sample, time: Array) -> Sample:
     """Return the targets with those out of reach replaced; the same object if there are none."""
     targets = wanted.position
     if leg.L6 > 0.0:

@@ -215,7 +215,7 @@ def _drawn(leg: FiveBar, cells: int) -> _Atlas:
     other = corners.ravel()
     joined = triple[one].any(axis=-1) & (triple[one] == triple[other]).all(axis=-1)
 
-    return _Atlas(q, triple, _numbered(triple, _roots(len(q), one[joined], other[joined])))
+    return _Atlas(q, triple, _number_parts(triple, _roots(len(q), one[joined], other[joined])))
 
 
 def _chart(leg: FiveBar, chart: int, s: int, cells: int) -> tuple[Array, Bools]:
@@ -299,7 +299,7 @@ def _roots(count: int, one: Ints, other: Ints) -> Ints:
     return root
 
 
-def _numbered(triple: Ints, root: Ints) -> Ints:
+def _number_parts(triple: Ints, root: Ints) -> Ints:
     """Return each node's part: 1 for the part of most nodes among those of one triple, 0 if few."""
     part = np.zeros(len(root), dtype=int)
     for signs_of_part in np.unique(triple[triple.any(axis=-1)], axis=0):

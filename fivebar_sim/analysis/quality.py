@@ -82,7 +82,7 @@ def determinant(leg: FiveBar, theta: ArrayLike, assembly: int | None = None) -> 
         LoopOpenError: Where the links do not meet, and at B = D.
         SingularError: Where B, C and D are in line: det J is infinite.
     """
-    return _decomposed(leg, theta, assembly)[0]
+    return _decompose(leg, theta, assembly)[0]
 
 
 def manipulability(leg: FiveBar, theta: ArrayLike, assembly: int | None = None) -> Array:
@@ -110,7 +110,7 @@ def condition(leg: FiveBar, theta: ArrayLike, assembly: int | None = None) -> Ar
         LoopOpenError: Where the links do not meet, and at B = D.
         SingularError: Where B, C and D are in line.
     """
-    _, s, _ = _decomposed(leg, theta, assembly)
+    _, s, _ = _decompose(leg, theta, assembly)
     lost = s[..., 1] == 0.0
     return np.where(lost, np.inf, s[..., 0] / np.where(lost, 1.0, s[..., 1]))
 
@@ -131,7 +131,7 @@ def velocity_ellipse(leg: FiveBar, theta: ArrayLike, assembly: int | None = None
         LoopOpenError: Where the links do not meet, and at B = D.
         SingularError: Where B, C and D are in line.
     """
-    _, s, U = _decomposed(leg, theta, assembly)
+    _, s, U = _decompose(leg, theta, assembly)
     return Ellipse(s, np.swapaxes(U, -1, -2))
 
 
@@ -151,7 +151,7 @@ def force_ellipse(leg: FiveBar, theta: ArrayLike, assembly: int | None = None) -
         LoopOpenError: Where the links do not meet, and at B = D.
         SingularError: Where B, C and D are in line.
     """
-    _, s, U = _decomposed(leg, theta, assembly)
+    _, s, U = _decompose(leg, theta, assembly)
     semi_axes = np.where(s > 0.0, 1.0 / np.where(s > 0.0, s, 1.0), np.inf)
     return Ellipse(semi_axes, np.swapaxes(U, -1, -2))
 
@@ -188,7 +188,7 @@ def transmission_angles(
     )
 
 
-def _decomposed(leg: FiveBar, theta: ArrayLike, assembly: int | None) -> tuple[Array, Array, Array]:
+def _decompose(leg: FiveBar, theta: ArrayLike, assembly: int | None) -> tuple[Array, Array, Array]:
     """Return det J (...), the singular values of J (..., 2) and U (..., 2, 2).
 
     s_2 = |det J| / s_1, with det J from its factors: where s_1 is great (B, C and D nearly in line)

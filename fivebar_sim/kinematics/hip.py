@@ -113,7 +113,7 @@ def forward(hip: Hip, theta3: ArrayLike, assembly: int | None = None) -> Array:
     """
     phi, theta = _split(theta3)
     F = _in_space(kinematics.forward(hip.leg, theta, assembly)) + hip.origin
-    return _turned(hip, F, phi)
+    return _turn(hip, F, phi)
 
 
 def leg_plane(hip: Hip, foot: ArrayLike, side: ArrayLike | None = None) -> InPlane:
@@ -205,7 +205,7 @@ def jacobian(hip: Hip, theta3: ArrayLike, assembly: int | None = None) -> Array:
     J = kinematics.jacobian(hip.leg, theta, assembly)
     F = _axis_up(hip, forward(hip, theta3, assembly))
     by_phi = _axis_up(hip, np.stack([-F[..., 1], F[..., 0], np.zeros(phi.shape)], axis=-1))
-    by_A, by_E = (_turned(hip, _in_space(J[..., k]), phi) for k in (0, 1))
+    by_A, by_E = (_turn(hip, _in_space(J[..., k]), phi) for k in (0, 1))
     return np.stack([by_phi, by_A, by_E], axis=-1)
 
 
@@ -240,7 +240,7 @@ def _axis_up(hip: Hip, v: Array) -> Array:
     return np.stack([v[..., 2], -v[..., 1], v[..., 0]], axis=-1)
 
 
-def _turned(hip: Hip, v: Array, phi: Array) -> Array:
+def _turn(hip: Hip, v: Array, phi: Array) -> Array:
     """Return body vectors (..., 3) turned by phi (...) about the hip's axis."""
     p, q, r = np.moveaxis(_axis_up(hip, v), -1, 0)
     c = np.cos(phi)

@@ -83,7 +83,7 @@ def trace(bar: FourBar) -> list[Array]:
             poses = [partial(_turning, bar, side) for side in (-1.0, 1.0)]
         else:
             poses = [partial(_swinging, bar, 0.5 * (start + stop), 0.5 * (stop - start))]
-        curves += [piece for pose in poses for piece in _sampled(bar, pose)]
+        curves += [piece for pose in poses for piece in _sample_poses(bar, pose)]
 
     if abs(bar.crank - bar.base) <= tiny and abs(bar.coupler - rocker) <= tiny:
         curves.append(np.stack([np.zeros_like(whole), whole], axis=-1))
@@ -162,7 +162,7 @@ def _on_side(bar: FourBar, theta: Array, side: Array) -> Array:
     return np.stack([theta, k], axis=-1)
 
 
-def _sampled(bar: FourBar, pose: Callable[[Array], Array]) -> list[Array]:
+def _sample_poses(bar: FourBar, pose: Callable[[Array], Array]) -> list[Array]:
     """Return the poses of 0 <= t <= 2 pi, so dense that neighbours are within `STEP`.
 
     A jump, which no halving of t fills, parts the polyline.

@@ -38,7 +38,7 @@ class Curves(NamedTuple):
     ends: NDArray[np.intp]
 
 
-def gathered(pieces: list[tuple[FourBar, Array]]) -> Curves:
+def gather(pieces: list[tuple[FourBar, Array]]) -> Curves:
     """Return polylines of poses as one sampling."""
     count = np.array([len(q) for _, q in pieces], dtype=np.intp)
     stop = np.cumsum(count)

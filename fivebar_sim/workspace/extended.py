@@ -32,7 +32,7 @@ from fivebar_sim.geometry import MODES, FiveBar
 from fivebar_sim.kinematics.closure import ROUNDING, bases
 from fivebar_sim.kinematics.reach import foot_radius_and_angle, inverse_all, reaches
 from fivebar_sim.workspace.coupler import cut, runs, spans, trace
-from fivebar_sim.workspace.curves import Curves, Rows, gathered, nearest_on
+from fivebar_sim.workspace.curves import Curves, Rows, gather, nearest_on
 from fivebar_sim.workspace.four_bar import Complex, FourBar, turn
 
 SAME = 1e-13
@@ -237,7 +237,7 @@ def _curves(leg: FiveBar, elbow: int, bar: FourBar, low: float, high: float) -> 
             outside = np.any([test(middle) >= 0.0 for test in tests], axis=0)
             pieces += [(one, piece) for piece in runs(q, outside)]
 
-    return gathered(pieces)
+    return gather(pieces)
 
 
 def _rockers(leg: FiveBar, low: float, high: float) -> list[float]:

@@ -97,7 +97,7 @@ def nearest(
         lost = ~whole.holds(p)
         if lost.any():
             # A boundary point may be out of reach by rounding: it is moved until it is within.
-            best[lost] = _settled(whole, whole.boundary_point(p[lost]))
+            best[lost] = _settle(whole, whole.boundary_point(p[lost]))
         return best
 
     return _by_blocks(solve, _finite(foot), (2,), whole.block)
@@ -208,7 +208,7 @@ def _by_blocks(
     return out.reshape((*foot.shape[:-1], *item))
 
 
-def _settled(whole: Rings | Extended, points: Array) -> Array:
+def _settle(whole: Rings | Extended, points: Array) -> Array:
     """Return boundary points moved to the first floating-point neighbours that are reachable.
 
     A boundary point is off by some units in the last place of the region's largest radius, which
