@@ -83,6 +83,18 @@ def test_ignored_interrupt_stays_ignored_and_the_other_signal_does_not(shell: Sh
         assert Path(sent.name).exists() == (status == 0)
 
 
+def test_half_made_recording_is_no_matter_for_stderr() -> None:
+    """Rerun warns of data that nobody takes: what a signal ends has such."""
+    code = """
+from fivebar_sim import recording
+with recording.session():
+    stream = recording.started("dropped")
+    del stream
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
+
+
 def dropped_by_the_interpreter(send: Callable[[], None]) -> None:
     class Goes:
         def __del__(self) -> None:

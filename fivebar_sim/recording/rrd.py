@@ -88,6 +88,7 @@ def session() -> Iterator[None]:
     Rerun's strictness is global, so one recording is made at a time. A recording that nothing
     refers to any more still keeps its threads and megabytes until it is cleaned up explicitly.
     """
+    _load()
     import rerun as rr
     import rerun_bindings
 
@@ -100,6 +101,20 @@ def session() -> Iterator[None]:
             rr.set_strict_mode(before)
             with suppress(RuntimeError):  # of a live one whose viewer has gone
                 rerun_bindings.flush_and_cleanup_orphaned_recordings()
+
+
+def _load() -> None:
+    """Import Rerun so that it does not warn of a recording that a signal ended half made.
+
+    Its log reads the environment once, when it is imported; a RUST_LOG of the user's stays.
+    """
+    ours = "RUST_LOG" not in os.environ
+    os.environ.setdefault("RUST_LOG", "warn,re_sdk=error")
+    try:
+        import rerun  # noqa: F401
+    finally:
+        if ours:
+            del os.environ["RUST_LOG"]
 
 
 def _encoded(runs: Sequence[Run], names: list[str]) -> bytes:
