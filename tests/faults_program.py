@@ -18,10 +18,10 @@ from msgspec.structs import replace as other
 from fivebar_sim import dynamics, kinematics, motion, rollout
 from fivebar_sim.control.servo import Servo
 from fivebar_sim.control.step import ControlStep
-from fivebar_sim.metrics import ground
+from fivebar_sim.metrics import ground, tracking
 from fivebar_sim.paths import Ellipse, Gait, base, csv, shapes
 from fivebar_sim.scenario import Scenario
-from fivebar_sim.simulation import feedback, measure, record
+from fivebar_sim.simulation import feedback, record
 from fivebar_sim.simulation import plan as planning
 
 Right = Callable[..., Any]
@@ -47,7 +47,7 @@ def seedless(right: Right, *args: Any, **keys: Any) -> None:
 
 def uncompensated(right: Right, self: Any, k: Any, command: Any) -> Any:
     sent = right(self, k, command)
-    return sent - self._servo.back_emf * self._theta_dot[:, -1:]
+    return sent - self._back_emf * self._theta_dot[:, -1:]
 
 
 def times(factor: float) -> Right:
@@ -264,6 +264,6 @@ RECORD = (
     Fault(
         "the mirrored assembly taken for right", ELLIPSE, around(kinematics, "branch", turned_over)
     ),
-    Fault("errors summed and not averaged", ELLIPSE, around(measure, "_rms", summed)),
+    Fault("errors summed and not averaged", ELLIPSE, around(tracking, "root_mean_square", summed)),
 )
 PROGRAM = (*PATHS, *PLANS, *CONTROLLERS, *STEP, *RECORD)

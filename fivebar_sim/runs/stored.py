@@ -8,12 +8,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from fivebar_sim.errors import FiveBarError, RunDirectoryError
+from fivebar_sim.kinematics.stops import SPEED_LIMIT
 from fivebar_sim.metrics import load
 from fivebar_sim.metrics.columns import JOINT_COLUMNS, Record
 from fivebar_sim.runs import directory, stored_metrics
 from fivebar_sim.scenario import Scenario
 from fivebar_sim.scenario.scenes import Ground, Treadmill
-from fivebar_sim.kinematics.stops import SPEED_LIMIT
 
 COLUMNS = (
     *("time", "target_x", "target_z", "foot_x", "foot_z"),

@@ -1,0 +1,1 @@
+"""Run directories: written, read back, their recording opened."""
