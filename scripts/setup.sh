@@ -8,7 +8,7 @@ fits='import sys; sys.exit(sys.version_info < (3, 11))'
 whole='import ensurepip, venv'
 
 find_python() { # prints the first Python that will do, or says why there is none
-    set -- python3 python3.14 python3.13 python3.12 python3.11 python
+    set -- python3 python3.15 python3.14 python3.13 python3.12 python3.11 python
     if [ -n "${PYTHON:-}" ]; then set -- "$PYTHON"; fi
     for candidate; do
         version=$("$candidate" --version 2>/dev/null) || continue
