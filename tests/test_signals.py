@@ -89,7 +89,7 @@ def test_ignored_interrupt_stays_ignored_and_the_other_signal_does_not(shell: Sh
 def test_half_made_recording_is_no_matter_for_stderr() -> None:
     """Rerun warns of data that nobody takes: what a signal ends has such."""
     code = """
-from fivebar_sim import recording
+from fivebar_sim.recording import rrd as recording
 with recording.session():
     stream = recording.started("dropped")
     del stream
