@@ -119,6 +119,17 @@ def test_controller_of_another_package_drives_the_leg(plug: Plug) -> None:
     np.testing.assert_allclose(rollout.plan(lead).ctrl, rollout.plan(scenario).ctrl + 0.01)
 
 
+def test_package_installed_meanwhile_is_found(plug: Plug, tmp_path: Path) -> None:
+    plug("strangers", {"ahead": "strangers:Ahead"})
+    assert "later" not in control.known()
+    info = tmp_path / "strangers" / "more-1.0.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text("Name: more\nVersion: 1.0\n", encoding="utf-8")
+    entry = "[fivebar_sim.controllers]\nlater = strangers:Ahead\n"
+    (info / "entry_points.txt").write_text(entry, encoding="utf-8")
+    assert "later" in control.known()
+
+
 def test_another_name_keeps_the_keys_that_both_have(plug: Plug) -> None:
     plug("strangers", {"ahead": "strangers:Ahead"})
     switched = load("controller.feedforward=velocity", "controller.name=ahead")

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import os
+import sys
 from collections.abc import Callable
+from functools import cache
 from importlib.metadata import EntryPoint, entry_points
 from typing import Any, ClassVar, NamedTuple, Protocol, runtime_checkable
 
@@ -98,6 +101,23 @@ def known() -> dict[str, EntryPoint]:
     Raises:
         ConfigError: If two packages bring a controller of one name.
     """
+    return dict(_installed(tuple(_stamp(path) for path in sys.path)))
+
+
+def _stamp(path: str) -> tuple[str, int]:
+    """Return a folder of sys.path and when something in it was installed or removed last."""
+    try:
+        return path, os.stat(path or ".").st_mtime_ns
+    except OSError:
+        return path, 0
+
+
+# Reading the metadata of every installed package takes longer than many a run, so it is read again
+# only after one of the folders has changed.
+@cache
+def _installed(stamps: tuple[tuple[str, int], ...]) -> dict[str, EntryPoint]:
+    """Return what `known` does, for folders in one state."""
+    del stamps  # what the cache goes by
     found: dict[str, EntryPoint] = {}
     for entry in entry_points(group=GROUP):
         if entry.name in found and found[entry.name].value != entry.value:

@@ -15,9 +15,7 @@ from fivebar_sim.scenario import Scenario
 def provenance(scenario: Scenario) -> dict[str, Any]:
     """Return what a run's numbers depend on besides the scenario's physics."""
     return {
-        "fivebar_sim": version("fivebar-sim"),
-        "mujoco": version("mujoco"),
-        "numpy": version("numpy"),
+        **_versions(),
         "python": platform.python_version(),
         "platform": f"{platform.system()} {platform.machine()}",
         "integrator": scenario.sim.integrator,
@@ -25,6 +23,12 @@ def provenance(scenario: Scenario) -> dict[str, Any]:
         "seed": scenario.sim.seed,
         "git": git_state(),
     }
+
+
+@cache
+def _versions() -> dict[str, str]:
+    """Return the versions of the packages that the numbers come from."""
+    return {"fivebar_sim": version("fivebar-sim")} | {p: version(p) for p in ("mujoco", "numpy")}
 
 
 @cache
