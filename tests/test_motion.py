@@ -68,6 +68,33 @@ def test_the_path_of_a_published_study_is_followed() -> None:
     assert np.abs(np.diff(m.q, axis=0)).max() < 5.0 * H  # continuous: no joint passes 4 rad/s
 
 
+@pytest.mark.parametrize(
+    "leg", [CLASSIC, HOCKEY, FiveBar.load("extended")], ids=lambda leg: leg.name
+)
+def test_poses_are_those_that_resting_paths_begin_with(leg: FiveBar) -> None:
+    home = kinematics.home(leg)
+    middle = kinematics.forward(leg, home[[0, 2]])
+    around = np.random.default_rng(5).uniform(-0.1, 0.1, (20, 2)) * leg.size
+    wanted = middle + around
+    q = motion.poses(leg, wanted)
+    for pose, (x, z) in zip(q, wanted.tolist(), strict=True):
+        hold = Lines(points=((x, z), (x, z)), seconds=1.0)
+        begun = plan(leg, hold, 1, H).q[0]
+        np.testing.assert_allclose(pose, begun, rtol=0.0, atol=1e-13)
+
+
+def test_poses_out_of_reach_are_refused_by_row() -> None:
+    feet_wanted = np.array([[0.0, -0.08], [0.0, -0.2]])
+    with pytest.raises(UnreachableError, match=r"\(0.00, -200.00\) mm is .* mm out") as caught:
+        motion.poses(CLASSIC, feet_wanted)
+    assert caught.value.index == (1,)
+
+
+def test_a_rest_pose_is_the_callers_own() -> None:
+    kinematics.home(CLASSIC)[:] = 0.0
+    assert kinematics.home(CLASSIC).any()
+
+
 def test_targets_in_reach_are_left_as_they_are() -> None:
     for leg, path in ((HOCKEY, study()), (FiveBar.load("extended"), _beside_home())):
         for a, b in zip(

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 
 from fivebar_sim.arrays import Array
 from fivebar_sim.errors import GeometryError
-from fivebar_sim.geometry import MODES, FiveBar
+from fivebar_sim.geometry import FiveBar
 from fivebar_sim.kinematics.closure import bases, branch
 from fivebar_sim.kinematics.planar import angle_between, cross, dot
-from fivebar_sim.kinematics.reach import inverse_all, points_at
+from fivebar_sim.kinematics.reach import points_at, solve
 
 GRID = 121
 """Foot positions tried along x and along z."""
@@ -31,6 +33,14 @@ def home(leg: FiveBar) -> Array:
     Raises:
         GeometryError: If no pose has the leg's working mode and assembly mode at once.
     """
+    # A copy, since callers may write into it.
+    return _home(leg).copy()
+
+
+# A run, a plan and a model each ask for the rest pose, and most of the time of the same few legs.
+@lru_cache(maxsize=256)
+def _home(leg: FiveBar) -> Array:
+    """Return what `home` does."""
     line = np.linspace(-1.0, 1.0, GRID) * (leg.size + leg.L5)
     column = np.stack([np.zeros(GRID), line], axis=-1)
     plane = np.stack(np.meshgrid(line, line, indexing="ij"), axis=-1).reshape(-1, 2)
@@ -45,8 +55,8 @@ def home(leg: FiveBar) -> Array:
 
 def _best(leg: FiveBar, foot: Array) -> Array | None:
     """Return the best pose (4,) of some foot positions (n, 2), or None if none is on the branch."""
-    theta = inverse_all(leg, foot)[:, MODES.index(leg.mode)]
-    found = np.isfinite(theta[:, 0])
+    theta, ok = solve(leg, foot, leg.mode)
+    found = ok.all(axis=-1)
     p = points_at(leg, foot[found], theta[found])
     A, E = bases(leg)
     AB = p.B - A
