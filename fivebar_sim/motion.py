@@ -100,6 +100,36 @@ def plan(
     return Motion(time, *foot, q, q_dot, q_ddot, force, payload)
 
 
+def poses(leg: FiveBar, foot: Array) -> Array:
+    """Return the poses in which a leg rests with its foot at some points, in its own branch.
+
+    Each is the pose that `plan` begins with, of a path that stays at the point.
+
+    Args:
+        leg: The leg.
+        foot: F [m], hip frame, (n, 2).
+
+    Returns:
+        (theta_A, theta_B, theta_E, theta_D) [rad], (n, 4).
+
+    Raises:
+        UnreachableError: A point that is out of reach, in the other assembly mode, or beyond a
+            joint's stop; `.index` is its row.
+        SingularError: Where a side chain is straight or folded.
+    """
+    rest = kinematics.home(leg)
+    still = np.zeros_like(foot)
+    at_rest = np.zeros(len(foot))  # every pose is one at t = 0
+    try:
+        angles = kinematics.joint_motion(leg, foot, still, still).q
+    except UnreachableError as error:
+        raise _out_of_reach(leg, foot, at_rest, error) from None
+
+    q = _in_turn(rest, angles, angles)
+    _check_stops(leg, rest, foot, at_rest, q)
+    return q
+
+
 def edge_margin(leg: FiveBar) -> float:
     """Return how far projected targets stay from the edge of the workspace [m].
 
@@ -171,15 +201,29 @@ def _lengths(vectors: Array) -> Array:
 def _continuous(rest: Array, q: Array) -> Array:
     """Return angles without jumps, begun in the turn of the rest pose.
 
-    The knees stay within half a turn in any working mode; the motors may go round. Theta_E starts
-    in the turn that puts the angle at C between its stops, as in the rest pose.
+    The knees stay within half a turn in any working mode; the motors may go round.
     """
     q = np.unwrap(q, axis=0)
+    return _in_turn(rest, q, q[0])
+
+
+def _in_turn(rest: Array, q: Array, begun: Array) -> Array:
+    """Return angles (n, 4) with the motors in the turns that bring `begun` next to the rest pose.
+
+    Theta_E is put in the turn in which the angle at C is between its stops, as in the rest pose.
+
+    Args:
+        rest: The rest pose [rad], (4,).
+        q: The angles [rad], (n, 4).
+        begun: The pose that decides for all of them, (4,), or one for each, (n, 4).
+    """
     turn = 2.0 * np.pi
-    q[:, [0, 2]] += turn * np.round((rest - q[0]) / turn)[[0, 2]]
+    turns = np.zeros_like(begun)
+    turns[..., [0, 2]] = turn * np.round((rest - begun) / turn)[..., [0, 2]]
+    q = q + turns
     # A and E got their turns each for itself; the stops decide which one E is really in.
     middle = 0.5 * sum(stops_at_C(rest))
-    q[:, 2] += turn * np.round((angle_at_C(q[0]) - middle) / turn)
+    q[:, 2] += turn * np.round((angle_at_C(begun + turns) - middle) / turn)
     return q
 
 

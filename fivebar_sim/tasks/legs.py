@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from fivebar_sim import model, motion
 from fivebar_sim.arrays import Array
 from fivebar_sim.errors import ArgumentError, UnreachableError
-from fivebar_sim.paths import Step
 from fivebar_sim.scenario.scenes import Ground
 from fivebar_sim.simulation.steps import Legs
 from fivebar_sim.tasks import Randomise, Task
@@ -145,11 +144,8 @@ def starts(task: Task) -> Array:
     away = task.spread * np.sqrt(i / STARTS)
     feet = wanted.foot[0] + away[:, None] * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
     q = np.tile(wanted.q[0], (STARTS, 1))
-
     if task.spread > 0.0:
-        for row, (x, z) in enumerate(feet[1:].tolist(), start=1):
-            hold = Step(start=(x, z), stop=(x, z), lift=0.0, seconds=1.0)
-            q[row] = motion.plan(task.leg, hold, 1, task.timestep).q[0]
+        q[1:] = motion.poses(task.leg, feet[1:])
 
     if not isinstance(task.scene, Ground):
         return q
