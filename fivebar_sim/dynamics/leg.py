@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -54,7 +55,7 @@ class LegDynamics:
 
     def __post_init__(self) -> None:
         # A frozen class sets its own fields only like this; `Chain.of` checks the other three.
-        object.__setattr__(self, "_chain", Chain.of(self.leg, self.assembly, self.payload))
+        object.__setattr__(self, "_chain", _chain(self.leg, self.assembly, self.payload))
 
     def inverse(
         self,
@@ -183,6 +184,13 @@ class LegDynamics:
     def soft_loop(self, q: ArrayLike, timestep: float, damping: float) -> Array:
         """Return the motion that the loop of `implicitfast` lets through [rad], (N + 1, 4)."""
         return stepwise.soften(self._chain, q, timestep, damping)
+
+
+# A controller asks for the same leg at every control step. Typed, since 1.0 == True.
+@lru_cache(maxsize=256, typed=True)
+def _chain(leg: FiveBar, assembly: int | None, payload: float) -> Chain:
+    """Return the constants of a leg, which `Chain.of` checks."""
+    return Chain.of(leg, assembly, payload)
 
 
 def _pairs(**values: ArrayLike) -> list[Array]:
