@@ -75,20 +75,29 @@ def build(
 
 
 @contextmanager
-def quiet() -> Iterator[None]:
+def without_log() -> Iterator[None]:
     """Keep MuJoCo from printing warnings, and from logging them in the working directory.
 
-    Those of a simulation are counted in its data; those of compiling a scene say that a leg whose
-    names have no prefix cannot be saved as part of another file.
+    Those of a simulation are counted in its data.
     """
     before = mujoco.get_mju_user_warning()
     mujoco.set_mju_user_warning(lambda message: None)
     try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            yield
+        yield
     finally:
         mujoco.set_mju_user_warning(before)
+
+
+@contextmanager
+def quiet() -> Iterator[None]:
+    """Keep MuJoCo's warnings about models from being logged, and from Python.
+
+    Compiling a scene says that a leg whose names have no prefix cannot be saved as part of another
+    file.
+    """
+    with without_log(), warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        yield
 
 
 def leg_spec(

@@ -65,7 +65,8 @@ class Bus:
             k: The step.
             command: (A, E) [rad or N m], (nsim, 2).
         """
-        n = min(self._every, self._steps - int(np.max(k)))
+        latest = k if isinstance(k, int) else int(k.max())
+        n = min(self._every, self._steps - latest)
         if self._prompt:
             return self._rounded(np.repeat(command[:, None], n, axis=1))
 

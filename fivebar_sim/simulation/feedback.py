@@ -17,7 +17,7 @@ from fivebar_sim.simulation.plan import Plan, period_steps
 from fivebar_sim.simulation.record import broken
 from fivebar_sim.simulation.steps import States, Watch, check, is_broken, simulate_asking
 
-MOTORS = [-4, -2]
+MOTORS = slice(-4, None, 2)
 """Where qpos and qvel have A and E."""
 
 
@@ -56,8 +56,8 @@ def steer(plans: Sequence[Plan], nthread: int, watch: Watch | None) -> States:
             ctrl[row, :, :-2] = plan.pushes[k : k + n]
 
         for group in groups:
-            q, v = (field[group.rows, new][..., MOTORS] for field in (so_far.qpos, so_far.qvel))
-            group.step.moved(q, v)
+            own = slice(None) if len(groups) == 1 else group.rows
+            group.step.moved(so_far.qpos[own, new, MOTORS], so_far.qvel[own, new, MOTORS])
             try:
                 command = _command(group, k)
             except PoseError as error:
@@ -88,16 +88,21 @@ def _raise_broken(plans: Sequence[Plan], states: States) -> None:
 
 def _groups(plans: Sequence[Plan]) -> list[_Group]:
     """Return the plans by what they have in common."""
-    rows: list[tuple[tuple, list[int]]] = []
+    members: dict[tuple, list[int]] = {}
     for row, plan in enumerate(plans):
         s = plan.scenario
-        key = (s.leg, s.servo, s.sensors, s.controller, plan.motion.payload)
-        same = next((members for known, members in rows if known == key), None)
-        if same is None:
-            rows.append((key, [row]))
-        else:
-            same.append(row)
-    return [_group([plans[row] for row in members], members) for _, members in rows]
+        kind = (s.leg, s.servo, s.sensors, _hashable(s.controller), plan.motion.payload)
+        members.setdefault(kind, []).append(row)
+    return [_group([plans[row] for row in rows], rows) for rows in members.values()]
+
+
+def _hashable(controller: object) -> object:
+    """Return a controller, or of one that cannot be hashed, as a user's may be, which one it is."""
+    try:
+        hash(controller)
+    except TypeError:
+        return id(controller)
+    return controller
 
 
 def _group(plans: list[Plan], rows: list[int]) -> _Group:
@@ -151,8 +156,8 @@ def _command(group: _Group, k: int) -> Array:
             f"got {command.dtype} of shape {command.shape}"
         )
 
-    bad = ~np.isfinite(command).all(axis=1)
-    if bad.any():
+    if not np.isfinite(command).all():
+        bad = ~np.isfinite(command).all(axis=1)
         raise PoseError("its command is not finite", (int(np.argmax(bad)),))
 
     return command

@@ -13,7 +13,7 @@ from mujoco.batch import Batch
 from fivebar_sim.arrays import Array, Bools
 from fivebar_sim.errors import ArgumentError, DivergedError
 from fivebar_sim.kinematics.stops import SPEED_LIMIT
-from fivebar_sim.model import quiet
+from fivebar_sim.model import without_log
 
 STATE = mujoco.mjtState.mjSTATE_FULLPHYSICS | mujoco.mjtState.mjSTATE_CTRL
 """What is recorded of every step: time, qpos, qvel, ctrl."""
@@ -122,7 +122,7 @@ class Legs:
             raise ArgumentError("ctrl must be finite: MuJoCo would reset the leg and go on")
 
         record = (STATE, *STEP) if self._ground is None else (STATE, *STEP, "sensordata")
-        with quiet():
+        with without_log():
             out = self._batch.rollout(ctrl.shape[1], ctrl, record=record)
 
         state = out[STATE]
@@ -273,5 +273,5 @@ def _sound(states: States, timestep: float) -> Bools:
 
 def _moves(states: States) -> Bools:
     """Return which states are finite and slow enough."""
-    finite = np.isfinite(states.qpos).all(-1) & np.isfinite(states.qvel).all(-1)
-    return finite & (np.abs(np.nan_to_num(states.qvel, nan=np.inf)).max(-1) < SPEED_LIMIT)
+    # NaN and inf are not below the limit either.
+    return np.isfinite(states.qpos).all(-1) & (np.abs(states.qvel) < SPEED_LIMIT).all(-1)

@@ -13,7 +13,7 @@ from dm_control.rl import control
 from dm_env import specs
 
 from fivebar_sim.arrays import Array
-from fivebar_sim.model import quiet
+from fivebar_sim.model import without_log
 from fivebar_sim.tasks import REASONS
 from fivebar_sim.tasks.episodes import Episodes, Outcome
 
@@ -38,7 +38,7 @@ class LegPhysics(Physics):
         data = self.data.ptr
         self.qpos = np.empty((nstep, model.nq))
         self.qvel = np.empty((nstep, model.nv))
-        with quiet():
+        with without_log():
             for k in range(nstep):
                 data.ctrl[:] = self.ctrl[min(k, len(self.ctrl) - 1)]
                 mujoco.mj_step(model, data)
