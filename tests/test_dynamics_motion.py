@@ -158,6 +158,13 @@ def test_step_that_is_far_too_long_is_refused() -> None:
         dynamics.simulate(LEG, START, (1.0, 1.0), 0.6, 1, lambda t, q, w: -1e-4 * w)
 
 
+def test_links_too_light_for_any_number_end_the_motion() -> None:
+    four = (1e-200,) * 4
+    leg = replace(LEG, mass=four, com=(0.01,) * 4, inertia=four, armature=0.0)
+    with pytest.raises(DivergedError, match=r"t = 0 s: the links are too light"):
+        dynamics.integrate(leg, START, STILL, [0.0, 0.1])
+
+
 def test_start_that_cannot_be_keeps_its_own_error() -> None:
     line = FiveBar(0.25, 0.5, 0.5, 0.25, 0.5)
     law = springs

@@ -167,19 +167,22 @@ class Chain:
         L2 = leg.L2
         L3 = leg.L3
         L4 = leg.L4
-        e1 = np.cos(theta_A), np.sin(theta_A)
-        e4 = np.cos(theta_E), np.sin(theta_E)
+        # NumPy's functions take twenty times as long for one number as those of math.
+        maths: Any = math if isinstance(theta_A, float) else np
+        e1 = maths.cos(theta_A), maths.sin(theta_A)
+        e4 = maths.cos(theta_E), maths.sin(theta_E)
         x = self.AE[0] + L4 * e4[0] - L1 * e1[0]  # BD
         z = self.AE[1] + L4 * e4[1] - L1 * e1[1]
         d2 = x * x + z * z
         area = ((L2 + L3) ** 2 - d2) * (d2 - (L2 - L3) ** 2)  # (4 times that of BCD) squared
 
-        if not (area > (2.0 * L2 * L3 * SINGULAR) ** 2).all():
+        regular = area > (2.0 * L2 * L3 * SINGULAR) ** 2
+        if regular is not True and not np.all(regular):
             # Only a bad pose gets here: `jacobian` raises what is wrong with it, and where.
             kinematics.jacobian(leg, np.stack([theta_A, theta_E], axis=-1), self.assembly)
 
         along = (d2 + (L2 - L3) * (L2 + L3)) / (2.0 * d2)
-        across = self.assembly * np.sqrt(area) / (2.0 * d2)
+        across = self.assembly * maths.sqrt(area) / (2.0 * d2)
         # From BD to BC by similarity, so that L2 and L3 need no trigonometry.
         BC = along * x - across * z, along * z + across * x
         e2 = BC[0] / L2, BC[1] / L2
