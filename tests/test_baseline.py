@@ -7,16 +7,14 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from shipped import NAMES, results
 
-from fivebar_sim import rollout
 from fivebar_sim.errors import ConfigError
 from fivebar_sim.files import resources
 from fivebar_sim.metrics import LIMIT_KEYS
 from fivebar_sim.metrics.catalogue import ABSOLUTE
 from fivebar_sim.regression import baseline
-from fivebar_sim.scenario import Scenario
 
-SHIPPED = sorted(resources.shipped("scenarios"))
 METRICS = {
     "tracking": {"rms": 1.23456789e-3, "max": 2e-3},
     "closure": {"rms": 1e-7, "max": 3e-7},
@@ -94,11 +92,11 @@ def test_place_is_beside_the_scenario() -> None:
 # oracle
 
 
-@pytest.mark.parametrize("name", SHIPPED)
+@pytest.mark.parametrize("name", NAMES)
 def test_shipped_baselines_are_what_is_measured_here(name: str) -> None:
     recorded = baseline.read(baseline.place(name))
     assert recorded is not None
-    measured = baseline.record(rollout.run(Scenario.load(name)).metrics)
+    measured = baseline.record(results()[name].metrics)
     assert recorded.metrics.keys() == measured.metrics.keys()
     for key, each in recorded.metrics.items():
         now = measured.metrics[key]
@@ -109,7 +107,7 @@ def test_shipped_baselines_are_what_is_measured_here(name: str) -> None:
 
 def test_every_shipped_baseline_has_its_scenario() -> None:
     folder = resources.folder("scenarios") / "baselines"
-    assert sorted(path.name for path in folder.iterdir()) == [f"{name}.json" for name in SHIPPED]
+    assert sorted(path.name for path in folder.iterdir()) == [f"{name}.json" for name in NAMES]
 
 
 # refusal

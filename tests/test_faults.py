@@ -19,11 +19,11 @@ import pytest
 from faults import MODEL, Fault
 from faults_program import PROGRAM
 from shell import Shell
+from shipped import NAMES
 
 from fivebar_sim import rollout
 from fivebar_sim.arrays import Array
 from fivebar_sim.errors import FiveBarError
-from fivebar_sim.files import resources
 from fivebar_sim.metrics import look_up
 from fivebar_sim.regression import baseline, comparison
 from fivebar_sim.rollout import Result
@@ -31,7 +31,6 @@ from fivebar_sim.scenario import Scenario
 from fivebar_sim.simulation.steps import Legs
 
 FAULTS = (*MODEL, *PROGRAM)
-NAMES = sorted(resources.shipped("scenarios"))
 
 REFUSED = {"knees on the wrong side", "sign of theta_B"}
 """Faults that leave nothing to simulate: the path is refused, by name, with exit status 2."""

@@ -10,6 +10,7 @@ import msgspec
 import numpy as np
 import pytest
 import tomli_w
+from shipped import NAMES, shortened
 
 from fivebar_sim import rollout
 from fivebar_sim.control.servo import Servo
@@ -111,7 +112,7 @@ def test_window_of_a_path_without_period_is_all_after_the_ramp(tmp_path: Path) -
     assert loaded.window == slice(100, 600)
 
 
-@pytest.mark.parametrize("name", [*resources.shipped("scenarios"), "odd"])
+@pytest.mark.parametrize("name", [*NAMES, "odd"])
 def test_resolved_table_gives_the_same_run(tmp_path: Path, name: str) -> None:
     if name == "odd":
         (tmp_path / "feet.txt").write_text(CSV, encoding="utf-8")
@@ -120,7 +121,7 @@ def test_resolved_table_gives_the_same_run(tmp_path: Path, name: str) -> None:
             tmp_path, *settings, "servo.limit=0.2", "limits.load.share_A=[0.4,0.6]", "leg.tilt=0.1"
         )
     else:
-        first = Scenario.load(name)
+        first = shortened(name)
     folder = tmp_path / "run"
     folder.mkdir()
     (folder / "scenario.toml").write_text(tomli_w.dumps(first.table()), encoding="utf-8")

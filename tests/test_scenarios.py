@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 import re
-from functools import cache
 from pathlib import Path
 
 import faults_disturbed as disturbed
 import pytest
+from shipped import NAMES, SCENARIOS, planned, results
 
 from fivebar_sim import control, rollout
 from fivebar_sim.control.servo import Servo
@@ -18,10 +18,7 @@ from fivebar_sim.metrics import Limit
 from fivebar_sim.metrics.guards import Guards
 from fivebar_sim.regression import baseline, comparison
 from fivebar_sim.rollout import Plan, Result
-from fivebar_sim.scenario import Scenario, scenes
-
-NAMES = sorted(resources.shipped("scenarios"))
-SCENARIOS = {name: Scenario.load(name) for name in NAMES}
+from fivebar_sim.scenario import scenes
 
 SOLIMP = "solimp of the loop 0.9 0.95"
 """Under `discrete` the gap of a loop that carries next to nothing hardly depends on it: 0.6 %."""
@@ -59,17 +56,6 @@ UNTIMED = {"rail-landing"}
 
 ERRORS = ("tracking.rms", "closure.max", "load.torque_rms.A", "load.torque_rms.E")
 """What every scenario has limits of."""
-
-
-@cache
-def planned(name: str) -> Plan:
-    return rollout.plan(SCENARIOS[name])
-
-
-@cache
-def results() -> dict[str, Result]:
-    """Return what comes of all scenarios, simulated together on two threads."""
-    return dict(zip(NAMES, rollout.run_all([planned(n) for n in NAMES], nthread=2), strict=True))
 
 
 def red(result: Result) -> bool:

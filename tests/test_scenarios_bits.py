@@ -13,28 +13,20 @@ from typing import Any
 
 import numpy as np
 import pytest
+from shipped import NAMES, shortened
 
 from fivebar_sim import rollout
-from fivebar_sim.files import resources
-from fivebar_sim.rollout import Plan, Result
-from fivebar_sim.scenario import Scenario
+from fivebar_sim.rollout import Result
 from fivebar_sim.simulation import steps
 
-NAMES = sorted(resources.shipped("scenarios"))
 SCRIPTS = Path(__file__).parents[1] / "scripts"
 WORKER = SCRIPTS / "determinism_runs.py"
-
-
-def shortest(name: str) -> Plan:
-    """Return the plan of the shortest run of a scenario that is measured at all."""
-    path = Scenario.load(name).path
-    return rollout.plan(Scenario.load(name, [f"duration={path.ramp + (path.period or 0.3)}"]))
 
 
 @pytest.fixture(scope="module")
 def alone() -> list[Result]:
     """Every scenario by itself, in the order of their names."""
-    return [rollout.execute(shortest(name)) for name in NAMES]
+    return [rollout.run(shortened(name)) for name in NAMES]
 
 
 def same_bits(result: Result, other: Result) -> None:
@@ -45,7 +37,7 @@ def same_bits(result: Result, other: Result) -> None:
 
 
 def test_two_of_each_together_on_two_threads(alone: list[Result]) -> None:
-    plans = [each for name in reversed(NAMES) for each in (shortest(name), shortest(name))]
+    plans = [each for name in reversed(NAMES) for each in [rollout.plan(shortened(name))] * 2]
     together = rollout.run_all(plans, nthread=2)
     for i, result in enumerate(reversed(alone)):
         same_bits(together[2 * i], result)

@@ -9,16 +9,14 @@ from functools import cache
 
 import numpy as np
 import pytest
+from shipped import NAMES, planned, shortened
 from test_guards import CASES, CHATTER, hurried
 
 from fivebar_sim import rollout
 from fivebar_sim.arrays import Array
-from fivebar_sim.files import resources
 from fivebar_sim.rollout import Plan, Result
 from fivebar_sim.scenario import Scenario
 from fivebar_sim.simulation.steps import Legs, States
-
-NAMES = sorted(resources.shipped("scenarios"))
 
 PART = 1e-13
 """By how much every command is off: that many rad or N m, and that part of it."""
@@ -79,9 +77,7 @@ def test_same_guard_trips_of_a_solver_that_is_hurried() -> None:
 
 @pytest.mark.parametrize("name", NAMES)
 def test_same_verdict_of_what_is_shipped_in_short(name: str) -> None:
-    path = Scenario.load(name).path
-    duration = path.ramp + (path.period or 0.3)
-    assert unmoved(nudged(rollout.plan(Scenario.load(name, [f"duration={duration}"])), 1))
+    assert unmoved(nudged(rollout.plan(shortened(name)), 1))
 
 
 @pytest.mark.long
@@ -93,7 +89,7 @@ def test_same_guards_trip_every_time(case: int) -> None:
 @pytest.mark.long
 @pytest.mark.parametrize("name", NAMES)
 def test_same_verdict_of_what_is_shipped(name: str) -> None:
-    results = nudged(rollout.plan(Scenario.load(name)), 4)
+    results = nudged(planned(name), 4)
     assert unmoved(results)
     assert outcome(results[0]) == ("pass", [])
 

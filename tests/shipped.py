@@ -1,0 +1,30 @@
+"""The shipped scenarios, and what comes of them, simulated once for all tests of a process."""
+
+from __future__ import annotations
+
+from functools import cache
+
+from fivebar_sim import rollout
+from fivebar_sim.files import resources
+from fivebar_sim.rollout import Plan, Result
+from fivebar_sim.scenario import Scenario
+
+NAMES = sorted(resources.shipped("scenarios"))
+SCENARIOS = {name: Scenario.load(name) for name in NAMES}
+
+
+def shortened(name: str) -> Scenario:
+    """Return a scenario with the shortest run that is measured at all: its ramp and a period."""
+    path = SCENARIOS[name].path
+    return Scenario.load(name, [f"duration={path.ramp + (path.period or 0.3)}"])
+
+
+@cache
+def planned(name: str) -> Plan:
+    return rollout.plan(SCENARIOS[name])
+
+
+@cache
+def results() -> dict[str, Result]:
+    """Return what comes of all scenarios, simulated together on two threads."""
+    return dict(zip(NAMES, rollout.run_all([planned(n) for n in NAMES], nthread=2), strict=True))
