@@ -241,7 +241,9 @@ def forward_dynamics(
     return psi_ddot, complex(x, z)
 
 
-def angles_of(leg: Leg, p: complex, v: complex, a: complex) -> tuple[list[float], ...]:
+def angles_of(
+    leg: Leg, p: complex, v: complex, a: complex
+) -> tuple[list[float], list[float], list[float]]:
     """Return psi, psi_dot, psi_ddot of one foot motion, given as x + 1j z; see `motion`."""
     psi = pose(leg, p)
     arms = foot(leg, psi)[1]
@@ -256,7 +258,13 @@ def angles_of(leg: Leg, p: complex, v: complex, a: complex) -> tuple[list[float]
 
 def torques(leg: Leg, p: complex, v: complex, a: complex, foot_force: complex = 0j) -> list[float]:
     """Return [tau_A, tau_E] [N m] of one motion and force, as x + 1j z; see `inverse_dynamics`."""
-    psi, psi_dot, psi_ddot = angles_of(leg, p, v, a)
+    return torques_of(leg, *angles_of(leg, p, v, a), foot_force)
+
+
+def torques_of(
+    leg: Leg, psi: Floats, psi_dot: Floats, psi_ddot: Floats, foot_force: complex = 0j
+) -> list[float]:
+    """Return what `torques` does, of a motion given by its angles, as `angles_of` returns them."""
     G_x, G_z = jacobian(loop(leg, psi)[1])
     need = np.dot(mass_matrix(leg, psi), psi_ddot) + bias(leg, psi, psi_dot, foot_force)
     K = np.transpose([[1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0], G_x, G_z])

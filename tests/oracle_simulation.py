@@ -58,11 +58,11 @@ class Servo:
         if self.feedforward == "none":
             psi = oracle.pose(leg, p)
         else:
-            psi, rate, _ = oracle.angles_of(leg, p, v, a)
+            psi, rate, acceleration = oracle.angles_of(leg, p, v, a)
             ahead = [self.kd * rate[0], self.kd * rate[3]]
-        if self.feedforward == "dynamics":
-            tau_ref = oracle.torques(leg, p, v, a)
-            ahead = [x + y for x, y in zip(ahead, tau_ref, strict=True)]
+            if self.feedforward == "dynamics":
+                tau_ref = oracle.torques_of(leg, psi, rate, acceleration)
+                ahead = [x + y for x, y in zip(ahead, tau_ref, strict=True)]
         tau = []
         for ref, extra, q, q_dot in zip((psi[0], psi[3]), ahead, theta, theta_dot, strict=True):
             pull = self.kp * math.remainder(ref - q, 2.0 * math.pi) + extra
