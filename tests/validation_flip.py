@@ -28,6 +28,8 @@ STIFF = Servo(kp=2000.0, kd=20.0)
 SOFT = Servo(kp=50.0, kd=0.3)
 """Of `classic`; other legs have them scaled with their size."""
 
+CLASSIC = FiveBar.load("classic").size  # [m]
+
 
 class Count(NamedTuple):
     """What became of the leg at all places.
@@ -65,7 +67,7 @@ def held(
     None where the leg cannot be. The force goes with up, +1 or -1.
     """
     x, z = foot.tolist()
-    factor = leg.size / FiveBar.load("classic").size
+    factor = leg.size / CLASSIC
     key = Key(leg.name, integrator, "none", timestep)
     scenario = air.scenario(
         leg,
