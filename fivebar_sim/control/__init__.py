@@ -1,4 +1,4 @@
-"""What a controller is, the servo that it drives, and what it sees."""
+"""The interface of controllers, the servos that they drive, and what their sensors show."""
 
 from fivebar_sim.control.interface import (
     Feedback,

@@ -1,4 +1,4 @@
-"""The bus to the servos: which command acts in each step, and as what angle."""
+"""The bus to the servos: which command acts in each step, and to which angle it is rounded."""
 
 from __future__ import annotations
 
@@ -11,40 +11,43 @@ from fivebar_sim.arrays import Array
 from fivebar_sim.control.servo import Drive, Servo
 
 Steps = int | NDArray[np.int64]
-"""A step that all legs are at, or that of each leg, (nsim,)."""
+"""One step for all legs, or the step of each leg, (nsim,)."""
 
 
 class Bus:
-    """Commands on their way to the servos of some legs: late, at the bus's rate, in whole steps.
+    """Commands on their way to the servos: delayed, sent at the bus's rate, rounded.
 
     One command is given every `every` timesteps, and `Servo.latched` says which of them acts.
     Angles are rounded to what can be commanded; torques are not.
 
     Args:
-        servos: One for each leg; they differ in gains, rate and delay alone.
-        drive: What the commands are.
+        servos: One for each leg; they may differ only in gains, rate and delay.
+        drive: Whether commands are angles or torques.
         timestep: h [s].
-        steps: Timesteps of the run.
-        every: Timesteps of a control period.
+        steps: Timesteps in the run.
+        every: Timesteps in a control period.
     """
 
     def __init__(
         self, servos: Sequence[Servo], drive: Drive, *, timestep: float, steps: int, every: int = 1
     ) -> None:
-        self._servo = servos[0]  # of which only the resolution is used
+        # Used for its resolution alone, which all servos of a group share.
+        self._servo = servos[0]
         self._drive = drive
         self._every = every
         self._steps = steps
         self._legs = np.arange(len(servos))
         self._rest = np.zeros((len(servos), 2))
 
+        # Thousands of legs may have few distinct buses: one row of steps for each kind.
         kinds = {(servo.rate, servo.delay): servo for servo in servos}
         numbers = {kind: number for number, kind in enumerate(kinds)}
         self._kind = np.array([numbers[servo.rate, servo.delay] for servo in servos])
         latched = np.stack([servo.latched(steps, timestep) for servo in kinds.values()])
-        self._period = latched // every  # whose command acts in each step; -1 is none yet
+        # The control period whose command acts in each step; -1 before the first arrives.
+        self._period = latched // every
 
-        # where every command acts at once, and until the next one, none needs to be kept
+        # If every command acts at once and until the next one, none needs to be stored.
         self._prompt = bool((self._period == np.arange(steps) // every).all())
         periods = 0 if self._prompt else -(-steps // every)
         self._commands = np.zeros((len(servos), periods, 2))
@@ -53,7 +56,7 @@ class Bus:
         """Put some legs back to step 0.
 
         Args:
-            rows: Which, (n,).
+            rows: Indices of those legs, (n,).
             rest: Commands that act until the first one arrives [rad or N m], (n, 2).
         """
         self._rest[rows] = rest
@@ -68,26 +71,27 @@ class Bus:
         latest = k if isinstance(k, int) else int(k.max())
         n = min(self._every, self._steps - latest)
         if self._prompt:
-            return self._rounded(np.repeat(command[:, None], n, axis=1))
+            return self._round(np.repeat(command[:, None], n, axis=1))
 
         at = np.broadcast_to(k, len(command))
         self._commands[self._legs, at // self._every] = command
-        return self._acting(self._period[self._kind[:, None], at[:, None] + np.arange(n)])
+        return self._look_up(self._period[self._kind[:, None], at[:, None] + np.arange(n)])
 
     def send_all(self, commands: Array) -> Array:
         """Return the commands that act in each step of the run, (nsim, N, 2).
 
         Args:
-            commands: Those of all control periods [rad or N m], (nsim, periods, 2).
+            commands: The commands of all control periods [rad or N m], (nsim, periods, 2).
         """
         self._commands = commands
-        return self._acting(self._period[self._kind])
+        return self._look_up(self._period[self._kind])
 
-    def _acting(self, period: NDArray[np.int64]) -> Array:
-        """Return the commands of some control periods, (nsim, n); of period -1 those at rest."""
+    def _look_up(self, period: NDArray[np.int64]) -> Array:
+        """Return the commands of control periods (nsim, n); in period -1 the one at rest."""
+        # Index -1 reads the last command, a legal place; the next line throws it away.
         sent = self._commands[self._legs[:, None], period]
         acting = np.where(period[..., None] < 0, self._rest[:, None], sent)
-        return self._rounded(acting)
+        return self._round(acting)
 
-    def _rounded(self, acting: Array) -> Array:
+    def _round(self, acting: Array) -> Array:
         return self._servo.rounded(acting) if self._drive == "position" else acting

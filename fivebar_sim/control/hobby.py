@@ -1,14 +1,14 @@
-"""Hobby servos at A and E: from motor angles to the angles they are sent, and what rounding costs.
+"""Hobby servos at A and E: the angles to command for given motor angles, and what rounding costs.
 
-A servo is sent an angle within its range, in whole steps. With theta anticlockwise from +x of the
-hip frame, and from AE on as the servos are mounted on it (AE is turned by `tilt`):
+A servo takes an angle within its range, in whole steps. Theta is anticlockwise from +x of the hip
+frame; the servos are mounted on AE, which is turned by `tilt`, and count from there:
 
     commanded = offset + direction (theta - tilt), plus whole turns, rounded to the nearest step
 
 The published controller sends 90 deg + angle in whole degrees, 0..180 deg, on both sides: that is
 `PUBLISHED`. It fits a leg that stands upright with both cranks between -90 and 90 deg. A hanging
-leg with its knees outwards has theta_A about -135 deg and theta_E about -45 deg, of which the
-published offset puts theta_A out of range; `HANGING`, the default, puts these two at mid-range.
+leg with its knees outwards has theta_A about -135 deg and theta_E about -45 deg, and the published
+offset would put theta_A out of range; `HANGING`, the default, puts these two at mid-range.
 
 Everything is in radians, commanded angles too: divide by the resolution for a count of steps.
 """
@@ -34,13 +34,13 @@ from fivebar_sim.kinematics.rates import jacobian
 TURN = 2.0 * math.pi
 
 TIE = 1e-9
-"""Part of a step by which an angle may miss a half step, or an end of the range, and still count as
-on it: the rounding of degrees given in radians."""
+"""How far an angle may be off a half step, or off an end of the range, and still count as on it, as
+a fraction of a step: degrees converted to radians are rounded."""
 
 
 @dataclass(frozen=True, slots=True)
 class HobbyServo:
-    """One servo: how its commanded angle is made of the motor angle.
+    """One servo: how its commanded angle follows from the motor angle.
 
     Attributes:
         offset: Commanded angle at theta = tilt [rad].
@@ -57,6 +57,7 @@ class HobbyServo:
 
     def __post_init__(self) -> None:
         check_number("offset", self.offset, "rad")
+        # Checked by type too: 1.0 and True equal 1, and neither is a direction.
         if self.direction not in (-1, 1) or type(self.direction) is not int:
             raise ArgumentError(f"direction must be -1 or 1, got {self.direction!r}")
         if not isinstance(self.range, tuple) or len(self.range) != 2:
@@ -66,6 +67,7 @@ class HobbyServo:
             check_number("range", end, "rad")
 
         low, high = self.range
+        # Wider than a turn, an angle would have two commands in the range.
         if not 0.0 < high - low <= TURN * (1.0 + TIE):
             raise ArgumentError(f"range must be in (0, {TURN:g}] rad wide, got {self.range!r}")
 
@@ -83,7 +85,7 @@ class HobbyServo:
 
     @property
     def half_step(self) -> float:
-        """The most by which rounding moves an angle [rad]."""
+        """The largest change of an angle by rounding [rad]."""
         return (0.5 + TIE) * self.resolution
 
 
@@ -92,8 +94,8 @@ class ServoTable:
     """The servos of both motors.
 
     Attributes:
-        A: At A.
-        E: At E.
+        A: The servo at A.
+        E: The servo at E.
     """
 
     A: HobbyServo
@@ -109,10 +111,10 @@ theta_E in -135..45 deg, a half turn about cranks that point 45 deg outwards and
 
 
 class RoundingBound(NamedTuple):
-    """The most by which rounding moves the foot [m], in two parts, each of shape (...).
+    """Bound on how far rounding moves the foot [m], in two parts, each of shape (...).
 
     Attributes:
-        first: To first order in the step: what the Jacobian makes of half a step on each servo.
+        first: First order in the step: half a step on each servo, through the Jacobian.
         remainder: All higher orders; inf where rounding may bring B, C and D in line.
     """
 
@@ -135,7 +137,7 @@ def servo_angles(leg: FiveBar, theta: ArrayLike, table: ServoTable = HANGING) ->
     `TIE`, goes up.
 
     Args:
-        leg: The leg; its tilt is all that counts.
+        leg: The leg; only its tilt is used.
         theta: (theta_A, theta_E) [rad], (..., 2).
         table: The servos.
 
@@ -143,8 +145,8 @@ def servo_angles(leg: FiveBar, theta: ArrayLike, table: ServoTable = HANGING) ->
         Commanded angles of the servos at A and E [rad], whole steps from `low`, (..., 2).
 
     Raises:
-        UnreachableError: Unless low <= commanded <= high in every pose; `.index` is that of the
-            first pose beyond.
+        UnreachableError: Unless low <= commanded <= high in every pose; `.index` is the first pose
+            out of range.
         ArgumentError: A shape other than (..., 2), or angles that are not finite.
     """
     theta = _finite_pairs(theta, "theta")
@@ -154,10 +156,12 @@ def servo_angles(leg: FiveBar, theta: ArrayLike, table: ServoTable = HANGING) ->
         low, high = servo.range
         middle = 0.5 * (low + high)
         angle = servo.offset + servo.direction * (theta[..., side] - leg.tilt)
+        # The whole turn nearest to mid-range: no other can be within a range of at most a turn.
         angle = middle + wrap(angle - middle)
         steps = (angle - low) / servo.resolution
         beyond[..., side] = ~((steps >= -TIE) & (steps <= servo.steps + TIE))
-        whole = np.clip(np.floor(steps + 0.5 + TIE), 0, servo.steps)  # cuts what is within TIE
+        # Angles past an end by less than TIE were let pass: here they go to that end.
+        whole = np.clip(np.floor(steps + 0.5 + TIE), 0, servo.steps)
         commanded[..., side] = np.where(
             beyond[..., side], angle, low + whole * ((high - low) / servo.steps)
         )
@@ -171,7 +175,7 @@ def joint_angles(leg: FiveBar, commanded: ArrayLike, table: ServoTable = HANGING
     """Return the motor angles of commanded angles, theta = tilt + direction (commanded - offset).
 
     Args:
-        leg: The leg; its tilt is all that counts.
+        leg: The leg; only its tilt is used.
         commanded: Commanded angles of the servos at A and E [rad], whole steps or not, (..., 2).
         table: The servos.
 
@@ -179,8 +183,8 @@ def joint_angles(leg: FiveBar, commanded: ArrayLike, table: ServoTable = HANGING
         (theta_A, theta_E) [rad] in (-pi, pi], (..., 2).
 
     Raises:
-        UnreachableError: Unless low <= commanded <= high in every pose; `.index` is that of the
-            first pose beyond.
+        UnreachableError: Unless low <= commanded <= high in every pose; `.index` is the first pose
+            out of range.
         ArgumentError: A shape other than (..., 2), or angles that are not finite.
     """
     commanded = _finite_pairs(commanded, "commanded")
@@ -196,7 +200,7 @@ def joint_angles(leg: FiveBar, commanded: ArrayLike, table: ServoTable = HANGING
 
 
 def rounding_error(leg: FiveBar, theta: ArrayLike, table: ServoTable = HANGING) -> Array:
-    """Return by how much the servos' steps move the foot, forward(rounded) - forward(theta).
+    """Return how far the servos' rounding moves the foot, forward(rounded) - forward(theta).
 
     Exact, in the leg's own assembly mode.
 
@@ -209,15 +213,15 @@ def rounding_error(leg: FiveBar, theta: ArrayLike, table: ServoTable = HANGING) 
         The shift of F [m], hip frame, (..., 2).
 
     Raises:
-        UnreachableError: Where a servo's range ends before.
-        LoopOpenError: Where the links do not meet, or not at the rounded angles.
+        UnreachableError: Where an angle is out of a servo's range.
+        LoopOpenError: Where the links do not meet at the angles, or at the rounded ones.
     """
     rounded = joint_angles(leg, servo_angles(leg, theta, table), table)
     return forward(leg, rounded) - forward(leg, theta)
 
 
 def rounding_bound(leg: FiveBar, theta: ArrayLike, table: ServoTable = HANGING) -> RoundingBound:
-    """Return the most by which the servos' steps can move the foot, whatever the steps' places.
+    """Return how far the servos' rounding can move the foot at most, wherever their steps lie.
 
     With h_A, h_E half a step, lam = L6 / L2, d = |BD| and gamma the angle at C:
 
@@ -226,9 +230,9 @@ def rounding_bound(leg: FiveBar, theta: ArrayLike, table: ServoTable = HANGING) 
         a = (L1 h_A^2 + L4 h_E^2 + (1/L2 + 1/L3) (k / s)^2) / s
         k = L1 h_A + L4 h_E,   s = least sin(gamma) for |BD| within d -+ k
 
-    On the straight way from theta to the rounded angles let one dot be d/dt, t from 0 to 1. B and D
+    On the straight line from theta to the rounded angles let a dot be d/dt, t from 0 to 1. B and D
     move by no more than k against each other, so sin(gamma) >= s: gamma grows with |BD|, and its
-    sine has no least value but at the ends. L2 and L3 turn with |psi_2_dot| <= k / (L2 s) and
+    sine is least at an end of the interval. L2 and L3 turn with |psi_2_dot| <= k / (L2 s) and
     |psi_3_dot| <= k / (L3 s). C obeys, along the directions u of BC and v of DC,
 
         u . C_ddot = u . B_ddot - L2 psi_2_dot^2,   v . C_ddot = v . D_ddot - L3 psi_3_dot^2
@@ -240,7 +244,7 @@ def rounding_bound(leg: FiveBar, theta: ArrayLike, table: ServoTable = HANGING) 
     Args:
         leg: The leg.
         theta: (theta_A, theta_E) [rad], (..., 2).
-        table: The servos; only the resolutions count.
+        table: The servos; only their resolutions are used.
 
     Raises:
         LoopOpenError: Where the links do not meet.
@@ -258,16 +262,18 @@ def rounding_bound(leg: FiveBar, theta: ArrayLike, table: ServoTable = HANGING) 
     d = np.sqrt(dot(D - B, D - B))
     s = np.minimum(_sine_at_C(leg, d - k), _sine_at_C(leg, d + k))
 
-    with np.errstate(divide="ignore"):  # s = 0: the bound is inf
+    # Where rounding may bring B, C and D in line s is 0, and the bound is inf.
+    with np.errstate(divide="ignore"):
         turning = (1.0 / leg.L2 + 1.0 / leg.L3) * (k / s) ** 2
         C_ddot = (leg.L1 * h_A**2 + leg.L4 * h_E**2 + turning) / s
     return RoundingBound(first, 0.5 * ((1.0 + lam) * C_ddot + lam * leg.L1 * h_A**2))
 
 
 def _sine_at_C(leg: FiveBar, d: Array) -> Array:
-    """Return the sine of the angle at C for |BD| = d [m], and 0 where no such triangle is."""
+    """Return the sine of the angle at C for |BD| = d [m], and 0 where the triangle cannot close."""
     high = leg.L2 + leg.L3
     low = leg.L2 - leg.L3
+    # Heron's formula with 4 area = 2 L2 L3 sin; outside of the triangle the product is negative.
     square = (high**2 - d**2) * (d**2 - low**2)
     return np.where(d > 0.0, np.sqrt(np.maximum(square, 0.0)), 0.0) / (2.0 * leg.L2 * leg.L3)
 
@@ -282,7 +288,7 @@ def _finite_pairs(values: ArrayLike, name: str) -> Array:
 
 
 def _beyond_range(commanded: Array, beyond: Bools, table: ServoTable) -> UnreachableError:
-    """Return the error for commanded angles of which not all are in their servo's range."""
+    """Return the error for commanded angles that are not all in their servo's range."""
     bad = np.logical_not((~beyond).all(axis=-1))
     index = first_index(bad)
     side = int(np.argmax(beyond[index]))

@@ -1,4 +1,4 @@
-"""White noise of some legs, each with a seed of its own."""
+"""White sensor noise, each leg with a seed of its own."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 from fivebar_sim.arrays import Array
 
 DRAWN = 64
-"""Control steps whose noise is drawn in one go; the numbers are those of one by one."""
+"""Control steps of noise to draw in one call; the numbers are the same as drawn one by one."""
 
 
 class Noise:
-    """Normal numbers of variance 1 for the angles and rates of legs.
+    """Standard normal numbers for the angles and rates of several legs.
 
     A leg's numbers depend on its seed alone, not on the legs beside it.
 
@@ -23,19 +23,21 @@ class Noise:
     """
 
     def __init__(self, nsim: int) -> None:
+        # Placeholders: `restart` gives every leg its own generator.
         self._random = [np.random.default_rng(0)] * nsim
         self._drawn = np.empty((nsim, DRAWN, 2, 2))
         self._used = np.full(nsim, DRAWN)
         self._legs = np.arange(nsim)
 
     def restart(self, rows: NDArray[np.int64], seeds: Sequence[int]) -> None:
-        """Begin the numbers of some legs anew, from a seed each."""
+        """Start the numbers of some legs afresh, each from its seed."""
         for row, seed in zip(rows.tolist(), seeds, strict=True):
             self._random[row] = np.random.default_rng(seed)
+        # As if used up, so that the next draw takes them from the new generator.
         self._used[rows] = DRAWN
 
     def draw(self) -> Array:
-        """Return the next numbers of each leg, (nsim, 2, 2): of A and E, angles then rates."""
+        """Return the next numbers of each leg, (nsim, 2, 2): angles of A and E, then rates."""
         for row in np.flatnonzero(self._used == DRAWN).tolist():
             self._drawn[row] = self._random[row].standard_normal((DRAWN, 2, 2))
             self._used[row] = 0

@@ -1,4 +1,4 @@
-"""The sensors of A and E: what a feedback controller gets to see."""
+"""The sensors of A and E: what a feedback controller is shown."""
 
 from __future__ import annotations
 
@@ -8,15 +8,16 @@ from fivebar_sim.checks import check_number, check_step
 
 
 class Sensors(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """Angle and rate of each motor, late, noisy and in steps: the defaults are exact.
+    """Angle and rate of each motor, delayed, noisy and quantised; by default exact.
 
         seen = round((theta(t - delay) + noise n) / resolution) resolution,   n ~ N(0, 1)
 
     Attributes:
-        delay: Age of what is seen [s]; rounded to whole timesteps.
+        delay: Age of a reading [s]; rounded to whole timesteps.
         noise: Standard deviation of the angles [rad], white from one control step to the next.
         rate_noise: Standard deviation of the rates [rad/s].
-        resolution: Step of the angles, as 2 pi / 4096 [rad]; 0 is none. Rates have none.
+        resolution: Step of the angles [rad], such as 2 pi / 4096; 0 for exact angles. Rates are
+            never quantised.
     """
 
     delay: float = 0.0

@@ -1,7 +1,7 @@
-"""The servo at A and E: its laws, what it hears of its commands, the torque that it really applies.
+"""The servo at A and E: its laws, which commands reach it, and the torque that it really applies.
 
 q, v        angle and rate of the motor's joint; u the command: an angle or a torque
-limit       [N m], speed [rad/s]: the DC motor's line, torque limit at rest, none at speed
+limit       [N m], speed [rad/s]: the DC motor's line, torque `limit` at rest and zero at `speed`
 """
 
 from __future__ import annotations
@@ -26,24 +26,24 @@ Drive = Literal["position", "torque"]
 
 
 class Servo(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """A servo at each motor; without `speed` an ideal one, with it a DC motor's.
+    """The servo at each motor: ideal without `speed`, with it a DC motor.
 
         position:  tau = clip(kp (u - q), limit) - kd v                       without speed
                    tau = clip(kp (u - q) - kd v, limit) - (limit / speed) v   with it
         torque:    tau = clip(u, limit) - (limit / speed) v                   0 without speed
 
-    In MuJoCo limit is the actuator's forcerange, and what stands behind the clip is the damping
-    of the motor's joint: the integrator treats it implicitly also while the limit clips.
+    In MuJoCo limit is the actuator's forcerange, and the term outside the clip is the damping of
+    the motor's joint: the integrator treats it implicitly, also while the limit clips.
 
     Attributes:
         kp: Position gain [N m/rad].
         kd: Derivative gain [N m s/rad].
-        limit: Largest torque [N m], that of the stalled motor; None is unlimited.
-        speed: No-load speed [rad/s], from which the motor has no torque left; None is no such line.
-        friction: Coulomb friction of the gear [N m]; not in the motor's torque.
-        rate: Commands a second that the bus brings [Hz]; None is one every timestep.
-        delay: From sending a command to its effect [s].
-        resolution: Step of the angles that can be commanded, counted from 0 [rad]; 0 is none.
+        limit: Largest torque [N m], at stall; None for no limit.
+        speed: No-load speed [rad/s], where the motor has no torque left; None for no such line.
+        friction: Coulomb friction of the gear [N m]; not part of the motor's torque.
+        rate: Commands per second on the bus [Hz]; None for one every timestep.
+        delay: Time from sending a command to its effect [s].
+        resolution: Step of the angles that can be commanded [rad], counted from 0; 0 for exact.
     """
 
     kp: float = 8.0
@@ -65,6 +65,7 @@ class Servo(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
             check_number("speed", self.speed, "rad/s", low=0.0, strict=True)
             if self.limit is None:
                 raise ArgumentError("speed needs limit beside it: the stalled motor's torque [N m]")
+            # Both may be legal and their quotient still overflow.
             check_number("limit / speed", self.back_emf, "N m s/rad")
 
         check_number("friction", self.friction, "N m", low=0.0)
@@ -76,16 +77,16 @@ class Servo(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
 
     @classmethod
     def load(cls, source: str | Path) -> Servo:
-        """Return the servo of a preset's name ("xl330") or of a TOML file's path.
+        """Return the servo of a preset ("xl330") or of a TOML file.
 
         Raises:
-            ConfigError: Unknown preset, unreadable file, unknown key, a number out of its range.
+            ConfigError: Unknown preset, unreadable file, unknown key, or a number out of range.
         """
         return tables.convert(read_table(source), cls, "servo", str(source))
 
     @property
     def back_emf(self) -> float:
-        """Torque that the motor loses with its rate, limit / speed [N m s/rad]."""
+        """Torque lost per rate of the motor, limit / speed [N m s/rad]."""
         return _back_emf(self)
 
     @property
@@ -98,7 +99,7 @@ class Servo(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
         return self.kd if _is_kd_passive(self, drive) else self.back_emf
 
     def latched(self, steps: int, timestep: float) -> NDArray[np.int64]:
-        """Return which row of a table of commands acts in each step, (N,); -1 while none has come.
+        """Return which row of a table of commands acts in each step, (N,); -1 before the first.
 
         With n steps a command and d steps of delay, both rounded to the nearest and n >= 1,
 
@@ -116,12 +117,15 @@ class Servo(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
         check_number("timestep", timestep, "s", low=0.0, strict=True)
         hold = 1
         if self.rate is not None:
-            if not self.rate * timestep <= 1.0 + 1e-9:  # rounding of 1 / h
+            # Refused, not clipped: else the run would not be what its table says.
+            # 1e-9, since a rate of exactly one command a step may be rounded up.
+            if not self.rate * timestep <= 1.0 + 1e-9:
                 raise ArgumentError(
                     f"rate must be in (0, {1.0 / timestep:g}] Hz, at most one command a timestep "
                     f"of {timestep:g} s, got {self.rate!r}"
                 )
-            part = self.rate * timestep  # of a command in one step
+            # Commands per step; a command that outlasts the run would overflow 1 / part.
+            part = self.rate * timestep
             hold = max(1, round(1.0 / part) if part * steps > 1.0 else steps)
 
         late = round(min(self.delay / timestep, steps))
@@ -129,18 +133,18 @@ class Servo(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
         return np.where(since < 0, -1, since // hold * hold)
 
     def rounded(self, theta: Array) -> Array:
-        """Return the nearest angles that can be commanded [rad], of the argument's shape."""
+        """Return the nearest angles that can be commanded [rad], same shape as theta."""
         step = self.resolution
         return step * np.round(theta / step) if step > 0.0 else theta
 
 
 @dataclass(frozen=True, slots=True)
 class ServoArrays:
-    """n servos that differ in their gains; attributes are those of `Servo`.
+    """Struct-of-arrays view of n servos that differ in their gains; attributes as in `Servo`.
 
     Attributes:
-        kp: [N m/rad], (n, 1, 1).
-        kd: [N m s/rad], (n, 1, 1).
+        kp: Position gains [N m/rad], (n, 1, 1).
+        kd: Derivative gains [N m s/rad], (n, 1, 1).
         limit, speed, resolution: The same for all servos.
     """
 
@@ -162,6 +166,7 @@ class ServoArrays:
             if any(getattr(servo, name) != getattr(first, name) for servo in servos):
                 raise ArgumentError(f"servos of one group must have the same {name}")
 
+        # (n, 1, 1) broadcasts over (n, steps, motors).
         kp = np.array([[[servo.kp]] for servo in servos])
         kd = np.array([[[servo.kd]] for servo in servos])
         return cls(kp, kd, first.limit, first.speed, first.resolution)
@@ -178,7 +183,7 @@ class ServoArrays:
 
 
 def read_table(source: str | Path) -> tables.Table:
-    """Return the TOML table of a servo: of a preset's name, or of a file's path.
+    """Return the TOML table of a servo, from a preset's name or a file's path.
 
     Raises:
         ConfigError: Unknown preset, no such file, not TOML, or a number that is not finite.
@@ -195,7 +200,7 @@ def read_table(source: str | Path) -> tables.Table:
 def saturated(
     servo: Servo | ServoArrays, ctrl: Array, q: Array, v: Array, drive: Drive = "position"
 ) -> Bools:
-    """Return whether the limit clips in a step: it is decided with the state at its start.
+    """Return whether the limit clips in a step; the state at the step's start decides.
 
         position:  |kp (u - q)| > limit,  with speed |kp (u - q) - kd v| > limit
         torque:    |u| > limit
@@ -205,10 +210,10 @@ def saturated(
         ctrl: Commands u of the step [rad or N m].
         q: Motor angles before the step [rad].
         v: Motor rates before the step [rad/s].
-        drive: What the commands are.
+        drive: Whether commands are angles or torques.
 
     Returns:
-        Of the arguments' shape.
+        Truth values, same shape as the arguments.
     """
     if servo.limit is None:
         return np.zeros(np.shape(ctrl), dtype=bool)
@@ -245,13 +250,15 @@ def applied_torque(
         v: Motor rates before the step [rad/s].
         q_next: Motor angles after it [rad].
         v_next: Motor rates after it [rad/s].
-        drive: What the commands are.
+        drive: Whether commands are angles or torques.
 
     Returns:
-        Torque of each motor [N m], of the arguments' shape.
+        Torque of each motor [N m], same shape as the arguments.
     """
+    # MuJoCo's `discrete` integrator lets the spring act at the end of the step, not at its start.
     asked = _asked(servo, ctrl, q_next if integrator == "discrete" else q, v_next, drive)
     if servo.limit is not None:
+        # MuJoCo decides clipping, and its sign, with the state at the start under both integrators.
         side = np.sign(_asked(servo, ctrl, q, v, drive))
         asked = np.where(saturated(servo, ctrl, q, v, drive), side * servo.limit, asked)
     passive = servo.kd if _is_kd_passive(servo, drive) else servo.back_emf
@@ -269,7 +276,7 @@ def _is_kd_passive(servo: Servo | ServoArrays, drive: Drive) -> bool:
 
 
 def _asked(servo: Servo | ServoArrays, ctrl: Array, q: Array, v: Array, drive: Drive) -> Array:
-    """Return what the limit clips [N m]."""
+    """Return the torque before the limit clips it [N m]."""
     if drive == "torque":
         return ctrl
     spring = servo.kp * (ctrl - q)

@@ -1,6 +1,6 @@
-"""The control step: what is seen, and what of a command reaches the motors. Written once.
+"""The control step: what the sensors show, and what of a command reaches the motors.
 
-Whoever drives a leg in the loop, a scenario's controller or an agent, observes and commands here.
+Scenario controllers and learning agents both observe and command through this one class.
 """
 
 from __future__ import annotations
@@ -22,13 +22,15 @@ from fivebar_sim.errors import ArgumentError
 
 
 def whole_steps(name: str, seconds: float, timestep: float) -> int:
-    """Return a time in whole timesteps.
+    """Return a time as a number of timesteps.
 
     Raises:
-        ArgumentError: It is none, or less than one.
+        ArgumentError: The time is not a whole number of timesteps, or shorter than one.
     """
     check_number(name, seconds, "s", low=0.0, strict=True)
+    # Over a tiny timestep the quotient can be infinite, which round refuses.
     steps = round(min(seconds / timestep, LARGEST))
+    # Decimals are rounded as floats, 0.3 / 0.1 is 2.9999...: so a part in a million is let pass.
     if steps < 1 or abs(steps * timestep - seconds) > 1e-6 * seconds:
         raise ArgumentError(
             f"{name} must be a whole number of timesteps of {timestep:g} s, got {seconds!r} s"
@@ -37,20 +39,22 @@ def whole_steps(name: str, seconds: float, timestep: float) -> int:
 
 
 class ControlStep:
-    """Observations and commands of legs of one set of sensors and one servo, or one each.
+    """Observations and commands of legs that share their sensors and their kind of servo.
 
     A control step at k, every `every` timesteps, is `observe(k)`, then `send(k, command)`; the
-    steps that follow are reported to `moved`. Legs that `restart` are at other steps than the rest.
+    steps that follow are reported to `moved`. After a `restart` some legs are at another step than
+    the others.
 
     Args:
-        servo: Of all the legs, or one each; then they differ in gains, bus and delay alone.
-        sensors: Of all the legs.
-        drive: What the commands are.
+        servo: One servo for all legs, or one for each; those may differ only in gains, bus rate
+            and delay.
+        sensors: The sensors, the same for all legs.
+        drive: Whether commands are angles or torques.
         timestep: h [s].
-        every: Timesteps of a control period.
-        steps: Timesteps of the run.
+        every: Timesteps in a control period.
+        steps: Timesteps in the run.
         start: (theta_A, theta_E) at rest at the start [rad], (nsim, 2).
-        seeds: Of each leg's noise, (nsim,).
+        seeds: Seed of each leg's sensor noise, (nsim,).
     """
 
     def __init__(
@@ -67,13 +71,16 @@ class ControlStep:
     ) -> None:
         nsim = len(start)
         servos = [servo] * nsim if isinstance(servo, Servo) else list(servo)
-        ServoArrays.of(servos)  # refuses servos that differ in more than gains and bus
+        # Only for its check: it refuses servos that differ in more than gains and bus.
+        ServoArrays.of(servos)
         self.every = every
         self._back_emf = servos[0].back_emf
         self._sensors = sensors
         self._drive = drive
         self._h = timestep
-        late = round(min(sensors.delay / timestep, steps))  # later, only the start would be seen
+        # A delay longer than the run shows only the start, and would need a longer buffer.
+        late = round(min(sensors.delay / timestep, steps))
+        # The last late + 1 states: row 0 is `delay` old, the last row is the present.
         self._theta = np.empty((nsim, late + 1, 2))
         self._theta_dot = np.zeros_like(self._theta)
         noisy = sensors.noise > 0.0 or sensors.rate_noise > 0.0
@@ -85,23 +92,24 @@ class ControlStep:
         """Put some legs back to step 0.
 
         Args:
-            rows: Which, (n,).
+            rows: Indices of those legs, (n,).
             start: (theta_A, theta_E) at rest [rad], (n, 2).
-            seeds: Of their noise, (n,).
+            seeds: Seed of each one's sensor noise, (n,).
         """
         self._theta[rows] = start[:, None]
         self._theta_dot[rows] = 0.0
+        # Until a command arrives a servo holds where it stands, and a bare motor gives nothing.
         self._bus.restart(rows, start if self._drive == "position" else np.zeros_like(start))
         if self._noise is not None:
             self._noise.restart(rows, seeds)
 
     def moved(self, theta: Array, theta_dot: Array) -> None:
-        """Take note of the motor angles [rad] and rates [rad/s] of the last steps, (nsim, n, 2)."""
+        """Store the motor angles [rad] and rates [rad/s] of the last n steps, (nsim, n, 2)."""
         self._theta = _last(self._theta, theta)
         self._theta_dot = _last(self._theta_dot, theta_dot)
 
     def observe(self, k: Steps) -> Observation:
-        """Return what is seen at step k; the time is (nsim,) if k is."""
+        """Return what the sensors show at step k; the time is (nsim,) if k is."""
         sensors = self._sensors
         time = cast(float, k * self._h)
         theta = self._theta[:, 0]
@@ -110,6 +118,7 @@ class ControlStep:
             drawn = self._noise.draw()
             theta = theta + sensors.noise * drawn[:, 0]
             theta_dot = theta_dot + sensors.rate_noise * drawn[:, 1]
+        # After the noise: an encoder counts the angle that it sees, noise included.
         if sensors.resolution > 0.0:
             theta = np.round(theta / sensors.resolution) * sensors.resolution
         return Observation(time, theta, theta_dot)
@@ -127,11 +136,15 @@ class ControlStep:
         sent = self._bus.send(k, command)
         if self._drive == "position":
             return sent
+        # The driver sits on the motor and knows its present rate, without the sensors' delay.
         return sent + self._back_emf * self._theta_dot[:, -1:]
 
 
 def _last(before: Array, new: Array) -> Array:
-    """Return as many of the last steps as there were before, (nsim, n, 2), in memory of its own."""
+    """Return the last n of the old and new steps, as many as the old ones were, (nsim, n, 2).
+
+    Always a copy.
+    """
     keep = before.shape[1]
     if new.shape[1] >= keep:
         return new[:, new.shape[1] - keep :].copy()
