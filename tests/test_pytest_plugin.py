@@ -216,7 +216,7 @@ REFUSED = {
     '"mine.toml", settings="leg.L2=1"': "settings must be a list of",
     '"mine.toml", controller=7': "controller must be a msgspec Struct .*, got 7",
     '"mine.toml", controller=Ahead': "controller must be a msgspec Struct .*got <class",
-    '"mine.toml", controller=Ahead(lead={1j})': "controller 'Ahead' has a field that is no TOML",
+    '"mine.toml", controller=Ahead(lead={1j})': "controller 'Ahead' has a field that TOML cannot",
     '"mine.toml", controller=Ahead(), settings=["controller.lead=1"]': "settings change the contr",
     '"mine.toml", settings=["path.centre=[0.0, -0.2]"]': "reach",
     '"mine.toml", settings=["controller.name=pd", "controller.kd=9"]': "at t = ",

@@ -275,7 +275,7 @@ def test_ground_is_shown_where_there_is_one(shell: Shell) -> None:
         (["scene=air", "scene.mass=1"], "[scene]: unknown key 'mass'; known: kind"),
         (["path.kind=hop", "path.low=0.06", "path.high=0.08", "path.thrust=0.3", "path.flight=0.3"],
          "path.kind 'hop' needs a ground"),
-        (["force={kind='constant', value=[0, 5]}"], "[force] acts in no scene 'air'"),
+        (["force={kind='constant', value=[0, 5]}"], "[force] has no effect in scene 'air'"),
         (["scene=rail", "force={kind='stance', peak=[0, 5]}"], 'a force of kind "stance"'),
         (["force.value=[0, 1]"], "[force] needs a kind; known: constant, csv, stance"),
         (["controller.name=pd", "controller.period=0"], "controller.period must be in (0, inf) s"),

@@ -23,17 +23,17 @@ class ComputedTorque(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw
 
     With an exact model, a fast period and F = F*,   e_ddot + kd e_dot + kp e = 0.
 
-    With mass_error != 0 the controller takes all that moves, links, payload and rotors, for
-    1 + mass_error times as heavy as it is. Both gains then act 1 + mass_error times, and
-    -mass_error (theta_ddot* + M^-1 bias) drives the error.
+    With mass_error != 0 the controller's model of everything that moves, links, payload and
+    rotors, is 1 + mass_error times as heavy as the real leg. Both gains then act 1 + mass_error
+    times, and -mass_error (theta_ddot* + M^-1 bias) drives the error.
 
-    With an exact model a held torque is stable about a still reference for
+    With an exact model a torque held for a period is stable about a still reference for
     kp T / 2 < kd < 2 / T on any leg.
 
     Attributes:
         kp: Position gain [1/s^2].
-        kd: Rate gain [1/s]; 2 sqrt(kp) is critical.
-        mass_error: What the model's masses and inertias are off by; 0.2 is 20 % too heavy.
+        kd: Rate gain [1/s]; 2 sqrt(kp) is critical damping.
+        mass_error: Relative error of the model's masses and inertias; 0.2 is 20 % too heavy.
         period: Time between two commands T [s].
     """
 
@@ -57,10 +57,11 @@ class ComputedTorque(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw
             LoopOpenError: Where the links do not meet.
             SingularError: Where B, C and D are in line.
         """
-        del servo  # the motors are bare
+        del servo  # the motors are driven in torque
         theta = seen.theta
         rate = seen.theta_dot
         pd = self.kd * (wanted.theta_dot - rate) + self.kp * (wanted.theta - theta)
         a = wanted.theta_ddot + pd
+        # The force is left out here: it is not a mass, so the mass error must not scale it.
         moving = dynamics.inverse(leg, theta, rate, a, payload=wanted.payload)
         return (1.0 + self.mass_error) * moving + dynamics.statics(leg, theta, wanted.force)

@@ -24,24 +24,25 @@ class GainSchedule(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_o
         kp = kp_near + s (kp_far - kp_near),   kd likewise
         s = r^2 (3 - 2 r),   r = min(e / blend, 1),   e = |F(theta) - F*|
 
-    Angles at which the loop cannot close, as noise may bring them, have no foot: they are far.
+    Sensor noise may show angles at which the loop cannot close and there is no foot: those count
+    as far.
 
     The defaults suit the preset `airhockey` at a period T of 10 ms, where a constant
     (kp, kd) = (150, 5) breaks down. A held torque is stable about a still reference if every
     eigenvalue m of the mass matrix has kp T / 2 < kd < 2 m / T. In the middle of this leg's
     workspace (|x| <= 0.2 m, z from 0.4 to 0.7 m) the lesser m is 0.011 to 0.024 kg m^2, so kd must
     be below 2.2 to 4.7 N m s/rad; at the edge m falls to 0.004 kg m^2. Near the target, 150 N m/rad
-    are kept, and kd = 1.5 N m s/rad holds for m above 0.0075 kg m^2: targets further out
-    want smaller near gains. Far from it a spring that stiff would ask for so much torque that the
+    are kept, and kd = 1.5 N m s/rad is stable for m above 0.0075 kg m^2: targets further out
+    need smaller near gains. Far from it a spring that stiff would ask for so much torque that the
     leg is thrown across poses of other m within a period or two: 15 N m/rad is about critically
-    damped by 1 N m s/rad, and that holds for m above 0.005 kg m^2.
+    damped by 1 N m s/rad, and that is stable for m above 0.005 kg m^2.
 
     Attributes:
         kp_near: Position gain at the target [N m/rad].
         kd_near: Derivative gain at the target [N m s/rad].
-        kp_far: Position gain from the distance `blend` on [N m/rad].
-        kd_far: Derivative gain from there on [N m s/rad].
-        blend: Distance of foot and target over which the gains change [m].
+        kp_far: Position gain at the distance `blend` and beyond [N m/rad].
+        kd_far: Derivative gain there [N m s/rad].
+        blend: Distance from foot to target over which the gains change [m].
         period: Time between two commands T [s].
     """
 
@@ -64,8 +65,9 @@ class GainSchedule(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_o
 
     def command(self, leg: FiveBar, servo: Servo, seen: Observation, wanted: Reference) -> Array:
         """Return the motor torques [N m], (..., 2)."""
-        del servo  # the motors are bare
+        del servo  # the motors are driven in torque
         r = np.minimum(distance(leg, seen.theta, wanted.foot) / self.blend, 1.0)
+        # Its slope is 0 at both ends, so that the gains have no kink at `blend`.
         s = (r * r * (3.0 - 2.0 * r))[..., None]
         kp = self.kp_near + s * (self.kp_far - self.kp_near)
         kd = self.kd_near + s * (self.kd_far - self.kd_near)
@@ -89,6 +91,7 @@ def distance(leg: FiveBar, theta: Array, foot: Array) -> Array:
     except LoopOpenError:
         if theta.ndim == 1:
             return np.asarray(np.inf)
+        # One open loop makes `forward` refuse the whole batch: try each pose by itself.
         rows = zip(theta, foot, strict=True)
         return np.stack([distance(leg, *row) for row in rows])
     return np.hypot(d[..., 0], d[..., 1])

@@ -16,11 +16,11 @@ from fivebar_sim.geometry import FiveBar
 
 
 class GravityCompensation(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """Carry the leg's weight and the expected foot force: it rests in any pose, and floats.
+    """Carry the leg's weight and the expected foot force, so that the leg floats in any pose.
 
         tau = bias(theta, 0) - J^T F* - kd theta_dot
 
-    The reference's motion is not looked at, only its force and its payload.
+    The reference's motion is ignored; only its force and payload are used.
 
     Attributes:
         kd: Damping of each motor [N m s/rad].
@@ -43,7 +43,7 @@ class GravityCompensation(msgspec.Struct, frozen=True, forbid_unknown_fields=Tru
             LoopOpenError: Where the links do not meet.
             SingularError: Where B, C and D are in line.
         """
-        del servo  # the motors are bare
+        del servo  # the motors are driven in torque
         still = (0.0, 0.0)
         held = dynamics.inverse(leg, seen.theta, still, still, wanted.force, payload=wanted.payload)
         return held - self.kd * seen.theta_dot

@@ -18,11 +18,11 @@ from fivebar_sim.geometry import FiveBar
 
 
 class Impedance(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """Let the foot give way to forces that were not expected, like a spring with a damper.
+    """Let the foot give way to unexpected forces, like a spring with a damper.
 
         tau = J^T (stiffness (p* - p) + damping (p_dot* - p_dot) - F*) + bias(theta, 0)
 
-    p = F(theta) is the foot, p_dot = J theta_dot. F* is what the world is expected to do to the
+    p = F(theta) is the foot, p_dot = J theta_dot. F* is the expected force of the world on the
     foot: the leg pushes back with -F*, and its weight is carried. Under a real force F it rests at
 
         p - p* = (F - F*) / stiffness        along x and z of the hip frame.
@@ -31,8 +31,8 @@ class Impedance(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only
     which they damp nearly critically.
 
     Attributes:
-        stiffness: Of the spring along (x, z) [N/m].
-        damping: Of the damper along (x, z) [N s/m].
+        stiffness: Stiffness of the spring along (x, z) [N/m].
+        damping: Damping along (x, z) [N s/m].
         period: Time between two commands [s].
     """
 
@@ -54,7 +54,7 @@ class Impedance(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only
             LoopOpenError: Where the links do not meet.
             SingularError: Where B, C and D are in line.
         """
-        del servo  # the motors are bare
+        del servo  # the motors are driven in torque
         theta = seen.theta
         rate = seen.theta_dot
         J = kinematics.jacobian(leg, theta)
@@ -63,7 +63,8 @@ class Impedance(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only
         spring = np.asarray(self.stiffness) * (wanted.foot - p)
         pull = spring + np.asarray(self.damping) * (wanted.foot_dot - p_dot)
         still = (0.0, 0.0)
-        force = wanted.force - pull  # `inverse` takes what the world does, and has tau = -J^T F
+        # `inverse` takes the force on the foot and answers with tau = -J^T F: hence the sign.
+        force = wanted.force - pull
         return dynamics.inverse(leg, theta, still, still, force, payload=wanted.payload)
 
 

@@ -25,7 +25,7 @@ class Pd(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     A torque that is held for a period T is stable about a still reference if every eigenvalue m
     of the mass matrix has
 
-        kp T / 2 < kd < 2 m / T        and swings back within a period from kd = m / T on.
+        kp T / 2 < kd < 2 m / T        and swings back within a period if kd is above m / T.
 
     The default gains suit the preset `classic` (m = 2e-5 kg m^2) at 1 ms. A published study of the
     leg of preset `airhockey` has kp = 5, 50 and 150, kd = 5 and the first law.
@@ -33,7 +33,7 @@ class Pd(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     Attributes:
         kp: Position gain of each motor [N m/rad].
         kd: Derivative gain [N m s/rad].
-        derivative: What kd acts on, the measured rate or the rate's error.
+        derivative: Whether kd acts on the measured rate or on the rate's error.
         period: Time between two commands T [s].
     """
 
@@ -51,7 +51,7 @@ class Pd(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
 
     def command(self, leg: FiveBar, servo: Servo, seen: Observation, wanted: Reference) -> Array:
         """Return the motor torques [N m], (..., 2)."""
-        del leg, servo  # the law knows no leg
+        del leg, servo  # each motor by itself, driven in torque
         rate = -seen.theta_dot
         if self.derivative == "error":
             rate = wanted.theta_dot - seen.theta_dot

@@ -19,23 +19,23 @@ MOTORS = [0, 2]
 
 
 class Servo(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """Send the servos the joint angles of the path, shaped against their own lag.
+    """Send the servos the joint angles of the path, corrected for the servos' own lag.
 
         feedforward "none":      u = theta*
         feedforward "velocity":  u = theta* + (kd / kp) theta_dot*
         feedforward "torque":    u = theta* + (kd / kp) theta_dot* + tau* / kp
 
     A servo tau = kp (u - theta) - kd theta_dot trails a moving setpoint by kd / kp times its
-    speed; the second law takes that lag out, and leaves tau / kp. The third takes out that too:
-    tau* is what the motion takes, with the motion's payload and foot force and the gears'
-    friction. kd is all damping of the motor's joint, a no-load speed's share included.
+    speed; the second law removes that lag and leaves tau / kp. The third removes that too: tau* is
+    the torque that the motion needs, with its payload, its foot force and the gears' friction. kd
+    is all damping of the motor's joint, including the share of a no-load speed.
 
-    All are written in the terms of the integrator's step from t to t + h. Theta* is taken at
-    t + h with `discrete`, whose spring acts there, and at t with `implicitfast`. Theta_dot* is
-    what the rate will be after the step if the leg follows, (theta*(t + h) - theta*(t)) / h under
-    both: the damping acts on that rate, and the path's own rate at t + h is half a step ahead.
-    Tau* is `dynamics.step_torques`. Under `implicitfast` the loop opens by tens of micrometres:
-    the third law follows `dynamics.soft_loop`, which keeps the foot on its path nevertheless.
+    All terms are those of the integrator's step from t to t + h. Theta* is taken at t + h with
+    `discrete`, whose spring acts there, and at t with `implicitfast`. Theta_dot* is the rate after
+    the step if the leg follows, (theta*(t + h) - theta*(t)) / h under both: the damping acts on
+    that rate, and the path's own rate at t + h is half a step ahead. Tau* is
+    `dynamics.step_torques`. Under `implicitfast` the loop opens by tens of micrometres: the third
+    law follows `dynamics.soft_loop`, which keeps the foot on its path nevertheless.
 
     Attributes:
         feedforward: "none", "velocity" or "torque".
@@ -55,12 +55,15 @@ class Servo(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
         q = motion.q
         h = motion.timestep
         payload = motion.payload
+        # `implicitfast` must open the loop to pull the knees along: plan with that gap.
         if self.feedforward == "torque" and integrator == "implicitfast":
             q = dynamics.soft_loop(leg, q, h, servo.damping, payload=payload)
 
+        # The spring of `discrete` acts at the end of the step, that of `implicitfast` at its start.
         rows = slice(1, None) if integrator == "discrete" else slice(None, -1)
         u = q[rows][:, MOTORS]
         if self.feedforward != "none":
+            # The rate over the step is what the damping acts on; the path's is half a step ahead.
             rate = np.diff(q[:, MOTORS], axis=0) / h
             u = u + (servo.damping / servo.kp) * rate
 

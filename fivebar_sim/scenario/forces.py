@@ -1,4 +1,4 @@
-"""Foot forces: what the world does to the foot over time, F(t) in the hip frame.
+"""Foot forces: the force F(t) of the world on the foot, in the hip frame.
 
 A profile is a frozen table of numbers with a `kind`; `profile.at(time, path)` is the force.
 """
@@ -26,13 +26,13 @@ STRONGEST = 1e6
 """Upper end of forces [N]."""
 
 HEADERS = {("time_s", "x_N", "z_N"): 1.0}
-"""The legal header of a CSV, with the size of its unit [N]."""
+"""The legal header of a CSV, with its unit in newtons."""
 
 
 class FootForce(
     msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True, tag_field="kind"
 ):
-    """A force on the foot over time; a kind of it overrides `at`, and `end` if it stops."""
+    """A force on the foot over time; each kind overrides `at`, and `end` if it stops."""
 
     @property
     def end(self) -> float:
@@ -40,17 +40,17 @@ class FootForce(
         return math.inf
 
     def at(self, time: ArrayLike, path: FootPath) -> Array:
-        """Return what the world does to the foot.
+        """Return the force of the world on the foot.
 
         Args:
             time: [s], shape (...).
-            path: What the foot is meant to do at that time.
+            path: The foot's path, for kinds that depend on it.
 
         Returns:
             (Fx, Fz) [N] in the hip frame, shape (..., 2).
 
         Raises:
-            ArgumentError: Unless every time is in [0, end], or a path without what the kind needs.
+            ArgumentError: Unless every time is in [0, end], or the path lacks what the kind needs.
         """
         raise NotImplementedError
 
@@ -58,7 +58,7 @@ class FootForce(
         """Return the force with its files read and checked; names are relative to folder.
 
         Raises:
-            ConfigError: A file that cannot be read or says something illegal.
+            ConfigError: A file that cannot be read, or that holds an illegal value.
         """
         del folder  # only the kinds that read a file need it
         return self
@@ -109,11 +109,13 @@ class Stance(FootForce, frozen=True, tag="stance"):
                 'a force of kind "stance" needs a path of kind "gait", got '
                 f'"{path.__struct_config__.tag}"'
             )
+        # The path's own clock, so that the force keeps to the stance also within the ramp.
         cycle = path.cycle(time)
         sine = np.where(cycle < path.duty, np.sin(np.pi * cycle / path.duty), 0.0)
         return sine[..., None] * np.array(self.peak)
 
 
+# dict=True: cached_property stores its value in the object's __dict__, which a Struct lacks.
 class Csv(FootForce, frozen=True, tag="csv", dict=True):
     """Straight lines between the rows of a CSV file, whose first time becomes t = 0.
 
@@ -127,6 +129,7 @@ class Csv(FootForce, frozen=True, tag="csv", dict=True):
     file: str
 
     def __post_init__(self) -> None:
+        # No system takes a null byte in a name: Python raises a bare ValueError for one.
         if not self.file or "\0" in self.file:
             raise ArgumentError(f"file must be the name of a CSV file, got {self.file!r}")
 
@@ -140,7 +143,7 @@ class Csv(FootForce, frozen=True, tag="csv", dict=True):
 
         Raises:
             ArgumentError: Unless every time is in [0, end].
-            ConfigError: What `resolve` would raise, if the file was not read yet.
+            ConfigError: As `resolve`, if the file was not read yet.
         """
         del path
         t = times(time, self.end)
@@ -154,6 +157,7 @@ class Csv(FootForce, frozen=True, tag="csv", dict=True):
             ConfigError: The file cannot be read, or a line of it is illegal; gives its number.
         """
         bound = msgspec.structs.replace(self, file=str((folder / self.file).absolute()))
+        # Read now, so that a bad file is refused before the run and not during it.
         _ = bound._track
         return bound
 

@@ -1,4 +1,4 @@
-"""Reading a scenario's tables: each of them as what it stands for; errors name file and key."""
+"""Reading a scenario's tables into the objects they describe; errors name file and key."""
 
 from __future__ import annotations
 
@@ -21,22 +21,23 @@ from fivebar_sim.scenario import forces, scenes
 from fivebar_sim.scenario.forces import FootForce
 from fivebar_sim.scenario.scenes import Scene
 
+# It names a folder: Windows forbids these characters and cuts a blank off the end, and a leading
+# dot would hide it.
 NAME = re.compile(r"""(?![. ])[^/\\:*?"<>|]+(?<! )""")
 LONGEST_NAME = 200
-"""A file may have 255 bytes on most systems, and the run directory's stage adds some."""
-
+"""A name may have 255 bytes on most systems, and the run directory's stage adds some."""
 
 SHORT = {"leg": "preset", "servo": "preset", "scene": "kind"}
-"""Tables that may be a string instead, and the key that it stands for."""
+"""Tables that may be given as a string, and the key that the string is short for."""
 
 KINDS_OF = {"path": paths.KINDS, "scene": scenes.KINDS, "force": forces.KINDS}
-"""Tables whose `kind` says what their other keys are."""
+"""Tables whose `kind` decides which other keys they have."""
 
 
 def change(table: Table, parts: list[str], value: Any, where: str) -> None:
     """Apply one change to a scenario's table.
 
-    Another kind, or another controller.name, keeps only those keys that the new one has too.
+    A change of kind, or of controller.name, keeps only the keys that the new one has too.
 
     Raises:
         ConfigError: A part of the key is a value, not a table.
@@ -45,6 +46,7 @@ def change(table: Table, parts: list[str], value: Any, where: str) -> None:
     if isinstance(table.get(top), str) and top in SHORT and len(parts) > 1:
         table[top] = {SHORT[top]: table[top]}
 
+    # A metric's dotted key is one key, and the file may have written it as nested tables.
     if top == "limits" and len(parts) > 1:
         if isinstance(table.get("limits"), dict):
             table["limits"] = dict(tables.flat(table["limits"]))
@@ -54,6 +56,7 @@ def change(table: Table, parts: list[str], value: Any, where: str) -> None:
     if not isinstance(value, str):
         return
 
+    # Left in, a key of the old kind would be refused as unknown, though nobody asked for it.
     if top in KINDS_OF and parts == [top, "kind"] and value in KINDS_OF[top]:
         known = tables.keys(KINDS_OF[top][value])
         table[top] = {k: v for k, v in table[top].items() if k in known}
@@ -79,19 +82,20 @@ def name_and_duration(table: Table, where: str) -> tuple[str, float]:
 
 
 def _is_file_name(name: str) -> bool:
-    """Return whether a name may be that of a run directory, on any system."""
+    """Return whether a name can be a run directory's, on any system."""
     plain = NAME.fullmatch(name) is not None and name.isprintable()
+    # File systems count bytes, not characters.
     return plain and len(name.encode()) <= LONGEST_NAME
 
 
 def leg(value: Any, where: str, folder: Path) -> FiveBar:
-    """Return the leg of "classic", of a file beside the scenario, or of a table with changes."""
+    """Return the leg of a preset, of a file beside the scenario, or of a table with changes."""
     base, own = _preset("leg", geometry.read_table, FiveBar.from_table, value, where, folder)
     return FiveBar.from_table({**base, **own}, f"{where}: [leg]")
 
 
 def servo(value: Any, where: str, folder: Path) -> Servo:
-    """Return the servo of "xl330", of a file beside the scenario, or of a table with changes."""
+    """Return the servo of a preset, of a file beside the scenario, or of a table with changes."""
 
     def check(table: Table, source: str) -> Servo:
         return tables.convert(table, Servo, "servo", source)
@@ -101,7 +105,7 @@ def servo(value: Any, where: str, folder: Path) -> Servo:
 
 
 def _table(name: str, value: Any, where: str) -> Table:
-    """Return a copy of a table, or the one that a string stands for."""
+    """Return a copy of a table, or the table that a string is short for."""
     if isinstance(value, str):
         value = {SHORT[name]: value}
     if not isinstance(value, dict):
@@ -119,9 +123,9 @@ def _preset(
     where: str,
     folder: Path,
 ) -> tuple[Table, Table]:
-    """Return the table of a preset that ships, or of a file beside the scenario, and the changes.
+    """Return the table of a shipped preset, or of a file beside the scenario, and the changes.
 
-    The preset is legal by itself; its errors say that it is one.
+    The preset must be legal by itself; its errors say that they are the preset's.
     """
     own = _table(name, value, where)
     preset = own.pop("preset", None)
@@ -134,6 +138,7 @@ def _preset(
     try:
         table = read(source)
         tables.check_finite(table, str(source))
+        # Before the changes, so that nobody looks for the file's error in the scenario.
         check(table, str(source))
     except ConfigError as error:
         raise ConfigError(f"{where}: {name}.preset: {error}") from None
@@ -142,7 +147,7 @@ def _preset(
 
 
 def _kind(name: str, value: Any, where: str) -> type[Any]:
-    """Return the class that a table's `kind` names."""
+    """Return the class named by a table's `kind`."""
     known = KINDS_OF[name]
     if not isinstance(value, dict) or "kind" not in value:
         raise ConfigError(f"{where}: [{name}] needs a kind; known: {', '.join(sorted(known))}")
@@ -153,13 +158,13 @@ def _kind(name: str, value: Any, where: str) -> type[Any]:
 
 
 def path(value: Any, where: str, folder: Path) -> FootPath:
-    """Return the foot's path, its file read."""
+    """Return the foot's path, with its file read."""
     kind = _kind("path", value, where)
     return tables.convert(value, kind, "path", where).resolve(folder)
 
 
 def force(value: Any, where: str, folder: Path) -> FootForce | None:
-    """Return the foot's force profile, its file read; None where there is none."""
+    """Return the foot's force profile, with its file read; None if there is no [force]."""
     if value is None:
         return None
     kind = _kind("force", value, where)
@@ -167,7 +172,7 @@ def force(value: Any, where: str, folder: Path) -> FootForce | None:
 
 
 def scene(value: Any, where: str) -> Scene:
-    """Return the scene of "rail", or of a table."""
+    """Return the scene of a kind's name, such as "rail", or of a table."""
     if isinstance(value, str) and value not in scenes.KINDS:
         raise ConfigError(f"{where}: {unknown('scene', value, scenes.KINDS)}")
     own = _table("scene", value, where)

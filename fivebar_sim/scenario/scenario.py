@@ -38,22 +38,22 @@ KEYS = (
 
 
 class Scenario(msgspec.Struct, frozen=True, kw_only=True):
-    """One run, ready to be done.
+    """One run, ready to be simulated.
 
     Attributes:
-        name: What the run directory is called.
+        name: Name of the run directory.
         leg: The leg.
         path: The foot's path.
-        controller: What drives the motors: plans their setpoints, or is asked on the way.
+        controller: What drives the motors: plans all setpoints, or is asked at every control step.
         controller_name: Its name in the entry-point group.
         scene: What the leg hangs on and stands on.
-        duration: [s].
-        force: What the world does to the foot: applied in the scene "payload", and what the
-            controller reckons with in every scene; None is nothing.
+        duration: Length of the run [s].
+        force: Force of the world on the foot: applied in the scene "payload", and expected by the
+            controller in every scene; None for no force.
         servo: The servos at A and E.
-        sensors: What a feedback controller sees of them.
+        sensors: The sensors at A and E, for feedback controllers.
         sim: Timestep, integrator, seed.
-        guards: How far the run may go and still be one.
+        guards: Bounds beyond which the physics of the run cannot be trusted.
         limits: Metric's dotted key to (low, high).
     """
 
@@ -80,7 +80,7 @@ class Scenario(msgspec.Struct, frozen=True, kw_only=True):
     def window(self) -> slice:
         """The rows that tracking and load are measured over.
 
-        Whole periods after the ramp; of a path that comes to rest, until it does.
+        Whole periods after the ramp; for a path that comes to rest, up to that time.
         """
         h = self.sim.timestep
         ramp = self.path.ramp
@@ -88,13 +88,14 @@ class Scenario(msgspec.Struct, frozen=True, kw_only=True):
         first = round(ramp / h)
         last = self.steps
         if period is not None:
+            # 1e-9: a duration of whole periods must not lose one to rounding.
             periods = math.floor((self.duration - ramp) / period * (1.0 + 1e-9))
             return slice(first, min(round((ramp + periods * period) / h), last))
         return slice(first, min(round(min(self.path.rest, self.duration) / h), last))
 
     @property
     def command(self) -> int:
-        """The steps from one command of the motors to the next: the controller's, or the bus's."""
+        """Steps from one motor command to the next, of the slower of controller and bus."""
         own = self.controller.period if isinstance(self.controller, Feedback) else 0.0
         bus = 1.0 / self.servo.rate if self.servo.rate else 0.0
         return max(1, round(max(own, bus) / self.sim.timestep))
@@ -111,7 +112,7 @@ class Scenario(msgspec.Struct, frozen=True, kw_only=True):
 
     @property
     def foot_force(self) -> Array | None:
-        """What the world does to the foot, at every step [N], (N + 1, 2)."""
+        """The force of the world on the foot at every step [N], (N + 1, 2)."""
         return None if self.force is None else self.force.at(self.times, self.path)
 
     @property
@@ -121,19 +122,19 @@ class Scenario(msgspec.Struct, frozen=True, kw_only=True):
 
     @property
     def trunk(self) -> float:
-        """The mass that rides on the hip [kg]; 0 where the hip is fixed."""
+        """Mass of the trunk on the hip [kg]; 0 where the hip is fixed."""
         return self.scene.mass if isinstance(self.scene, Ground) else 0.0
 
     @classmethod
     def load(cls, source: str | Path, settings: Iterable[str] = ()) -> Scenario:
-        """Return the scenario of a shipped name or a TOML file.
+        """Return a shipped scenario by name, or the scenario of a TOML file.
 
         Args:
             source: "classic-ellipse", or a path.
             settings: Changes "KEY=VALUE" with dotted keys, applied in order.
 
         Raises:
-            ConfigError: The file cannot be read, or says something illegal; names file and key.
+            ConfigError: The file cannot be read, or a value in it is illegal; names file and key.
         """
         shipped = resources.shipped("scenarios")
         path = shipped.get(str(source), Path(source))
@@ -142,6 +143,7 @@ class Scenario(msgspec.Struct, frozen=True, kw_only=True):
         table = tables.read(path, "scenario")
         for setting in settings:
             reading.change(table, *tables.parse_setting(setting), str(source))
+        # A file without a name gives the run its own; a key `name` in it, or a setting, wins.
         return cls.from_table({"name": path.stem, **table}, str(source), path.parent)
 
     @classmethod
@@ -149,7 +151,7 @@ class Scenario(msgspec.Struct, frozen=True, kw_only=True):
         """Return the scenario of a table; `where` names it in messages, files are under `folder`.
 
         Raises:
-            ConfigError: The table says something illegal; names the key.
+            ConfigError: A value in the table is illegal; names the key.
         """
         tables.check_keys(table, KEYS, where)
         tables.check_finite(table, where)
@@ -162,7 +164,7 @@ class Scenario(msgspec.Struct, frozen=True, kw_only=True):
             path=path,
             controller=controller,
             controller_name=controller_name,
-            scene=_belted(reading.scene(table.get("scene", "air"), where), path, where),
+            scene=_with_belt_speed(reading.scene(table.get("scene", "air"), where), path, where),
             duration=duration,
             force=reading.force(table.get("force"), where, folder),
             servo=reading.servo(table.get("servo", {}), where, folder),
@@ -171,18 +173,19 @@ class Scenario(msgspec.Struct, frozen=True, kw_only=True):
             guards=tables.convert(table.get("guards", {}), Guards, "guards", where),
             limits=tables.bounds(table.get("limits", {}), LIMIT_KEYS, "limits", where),
         )
+        # Last: these compare the tables with each other, each of which is legal by now.
         _check_window(scenario, where)
         _check_scene(scenario, where)
 
         return scenario
 
     def driven_by(self, controller: Setpoints | Feedback) -> Scenario:
-        """Return the same scenario with another controller, under that one's name.
+        """Return the same scenario with another controller, under that controller's name.
 
         The name is that of the controller's entry point, or of its class if it has none.
 
         Raises:
-            ConfigError: The object is no controller, or has a field that no TOML could hold.
+            ConfigError: The object is not a controller, or has a field that TOML cannot hold.
         """
         ours = isinstance(controller, (Setpoints, Feedback))
         if not ours or not isinstance(controller, msgspec.Struct):
@@ -193,10 +196,13 @@ class Scenario(msgspec.Struct, frozen=True, kw_only=True):
 
         name = name_of(controller)
         driven = msgspec.structs.replace(self, controller=controller, controller_name=name)
+        # Tried now: the run directory is written after the run, too late to find out.
         try:
             tomli_w.dumps(driven.table())
         except TypeError as error:
-            raise ConfigError(f"controller {name!r} has a field that is no TOML: {error}") from None
+            raise ConfigError(
+                f"controller {name!r} has a field that TOML cannot hold: {error}"
+            ) from None
 
         return driven
 
@@ -234,23 +240,24 @@ class Scenario(msgspec.Struct, frozen=True, kw_only=True):
 
     @property
     def copies(self) -> tuple[str | None, str | None]:
-        """What the CSV of the path and that of the force are called beside a resolved scenario."""
+        """Names that the CSVs of path and force get beside a resolved scenario."""
         path = copied_name(self.path)
         force = copied_name(self.force)
+        # Two files of one name in different folders must not become one file here.
         return path, f"force-{force}" if force is not None and force == path else force
 
     @property
     def files(self) -> dict[str, str]:
-        """The CSVs that a resolved scenario has beside it: name there to where they are."""
+        """The CSVs to copy beside a resolved scenario: name of the copy to its source."""
         parts = zip((self.path, self.force), self.copies, strict=True)
         csvs = (paths.Csv, forces.Csv)
         return {name: part.file for part, name in parts if name and isinstance(part, csvs)}
 
 
 def copied_name(part: FootPath | FootForce | None) -> str | None:
-    """Return what a CSV is called beside a resolved scenario: ends with .csv, as no other file.
+    """Return the name of a CSV's copy beside a resolved scenario; None for other paths and forces.
 
-    None is for a path or force that is no CSV.
+    It ends with .csv, unlike the name of any other file there.
     """
     if not isinstance(part, (paths.Csv, forces.Csv)):
         return None
@@ -264,7 +271,7 @@ def _present(table: Table) -> Table:
 
 
 def _check_window(scenario: Scenario, where: str) -> None:
-    """Raise unless the run is long enough to be measured, and the path long enough for the run."""
+    """Raise unless the run is long enough to measure, and path and force last as long as it."""
     h = scenario.sim.timestep
     path = scenario.path
     duration = scenario.duration
@@ -273,6 +280,7 @@ def _check_window(scenario: Scenario, where: str) -> None:
         raise ConfigError(
             f"{where}: duration must be 2 to {MOST_STEPS} timesteps of {h:g} s, {came}"
         )
+    # 1e-9: the product of steps and timestep is rounded.
     if not scenario.steps * h <= path.end * (1.0 + 1e-9):
         raise ConfigError(f"{where}: duration must be at most the path's {path.end:g} s, {came}")
 
@@ -280,6 +288,7 @@ def _check_window(scenario: Scenario, where: str) -> None:
     if force is not None and not scenario.steps * h <= force.end * (1.0 + 1e-9):
         raise ConfigError(f"{where}: duration must be at most the force's {force.end:g} s, {came}")
 
+    # Asked only for its check: a bus faster than the timestep is refused.
     try:
         scenario.servo.latched(1, h)
     except ArgumentError as error:
@@ -297,8 +306,8 @@ def _check_window(scenario: Scenario, where: str) -> None:
         )
 
 
-def _belted(scene: Scene, path: FootPath, where: str) -> Scene:
-    """Return the scene; a belt without a speed gets that of the path's stance.
+def _with_belt_speed(scene: Scene, path: FootPath, where: str) -> Scene:
+    """Return the scene; a belt without a speed gets the path's stance speed.
 
     Raises:
         ConfigError: The path has no stance.
@@ -311,13 +320,14 @@ def _belted(scene: Scene, path: FootPath, where: str) -> Scene:
             f"must run"
         )
     try:
+        # May be refused: a legal gait can be faster than a belt may run.
         return msgspec.structs.replace(scene, speed=path.stance_speed)
     except ArgumentError as error:
         raise ConfigError(f"{where}: scene.{error} from the path's stance") from None
 
 
 def _check_scene(scenario: Scenario, where: str) -> None:
-    """Raise unless the scene has what path and limits need."""
+    """Raise unless the scene has what path, force and limits need."""
     scene = scenario.scene
     grounded = isinstance(scenario.scene, Ground)
     kind = scenario.path.__struct_config__.tag
@@ -327,7 +337,8 @@ def _check_scene(scenario: Scenario, where: str) -> None:
             f"got {scene.kind!r}"
         )
     if isinstance(scene, Air) and scenario.force is not None:
-        raise ConfigError(f"{where}: [force] acts in no scene 'air': scene must be another one")
+        raise ConfigError(f"{where}: [force] has no effect in scene 'air': choose another scene")
+    # A payload of nothing is the scene 'air' under another name.
     if isinstance(scene, Payload) and scene.mass == 0.0 and scenario.force is None:
         raise ConfigError(
             f"{where}: scene.mass must be in (0, inf) kg where there is no [force], got 0.0"

@@ -1,4 +1,4 @@
-"""Scenes: what the leg hangs on and stands on; the numbers of the files in models/scenes/.
+"""Scenes: what the leg hangs on and stands on. Each kind is a file in models/scenes/.
 
 `scene = "rail"` in a scenario is short for a table [scene] with that kind and its defaults.
 """
@@ -47,10 +47,10 @@ class Ground(Scene, frozen=True):
     """The hip on a vertical slide above a floor that the foot meets.
 
     Attributes:
-        mass: Of the trunk that rides on the hip [kg].
+        mass: Mass of the trunk on the hip [kg].
         drop: Height of the foot above the floor at the start [m]; 0 starts standing.
-        friction: Coulomb's coefficient between foot and floor; 0 is as good as frictionless.
-        stop: Lowest height of the hip above the floor [m]: there the rail ends, and the trunk sits
+        friction: Coulomb's coefficient between foot and floor; 0 is practically frictionless.
+        stop: Lowest height of the hip above the floor [m]: there the rail ends, and the trunk rests
             while the foot swings, as on the other legs. None: it falls as far as the leg lets it.
     """
 
@@ -75,8 +75,8 @@ class Treadmill(Ground, frozen=True, tag="treadmill"):
     """A floor that runs backwards, towards -x: stance and swing of a leg that walks.
 
     Attributes:
-        speed: Of the belt [m/s]; in a scenario None is the stance speed of its path, and a model
-            of its own has then a belt that stands still.
+        speed: Speed of the belt [m/s]. With None a scenario takes its path's stance speed, and a
+            model built without a scenario has a belt that stands still.
     """
 
     speed: float | None = None
@@ -93,7 +93,7 @@ KINDS: dict[str, type[Scene]] = {
 
 
 def named(kind: str) -> Scene:
-    """Return the scene of a kind with its defaults.
+    """Return a scene of the given kind with its defaults.
 
     Raises:
         ArgumentError: Unknown kind.
