@@ -1,4 +1,4 @@
-"""What a run is judged by: foot tracking, loop closure, load of the motors, energy, branch."""
+"""The metrics of a run: foot tracking, loop closure, load of the motors, energy, branch, guards."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ if TYPE_CHECKING:
 
 
 class Unrecorded(NamedTuple):
-    """What a run did besides its record.
+    """Per-step data that the metrics need and rollout.parquet leaves out.
 
     Attributes:
-        steps: What acted, and where it began.
+        steps: The forces that acted, and the pose at the start.
         saturated: Whether the torque limit clipped A and E in each step, (N, 2).
         unsolved: Whether MuJoCo's solver ran out of iterations in each step, (N,).
-        warnings: MuJoCo's warnings.
+        warnings: Number of MuJoCo's warnings.
     """
 
     steps: energy.Steps
@@ -37,16 +37,17 @@ class Unrecorded(NamedTuple):
 def measure(scenario: Scenario, record: Mapping[str, Array], besides: Unrecorded) -> dict[str, Any]:
     """Return the metrics of a run, in SI units.
 
-    tracking, closure and whatever else has a function of its own are those of `catalogue`; load is
-    that of `load.measure`, and saturated the part of the steps in which the torque limit clipped;
-    energy is that of `energy.measure`; branch and guards look at every step.
+    Tracking, closure and everything else with a function of its own come from `catalogue`; load
+    from `load.measure`, where saturated is the fraction of steps in which the torque limit clipped;
+    energy from `energy.measure`. Branch and guards look at every step, the others at the window.
 
     Args:
-        scenario: What was run.
+        scenario: The scenario that was run.
         record: The columns of rollout.parquet.
-        besides: What its record does not say.
+        besides: What the record leaves out.
     """
     leg = scenario.leg
+    # qpos may begin with the hip's height; its last four are A, B, E, D.
     start = besides.steps.start[-4::2]
     saturated = besides.saturated
     body = energy.Body(leg, scenario.payload, scenario.trunk)
@@ -74,7 +75,7 @@ def measure(scenario: Scenario, record: Mapping[str, Array], besides: Unrecorded
     if "ground_z" in record:
         tables["ground"] = ground.measure(leg, record, window)
 
-    # a row of the catalogue may add to one of these tables
+    # Merged, not replaced: a row of the catalogue may add a number to one of these tables.
     measured = catalogue.measure(leg, record, window)
     for name, table in tables.items():
         measured[name] = {**table, **measured[name]} if name in measured else table
@@ -84,19 +85,22 @@ def measure(scenario: Scenario, record: Mapping[str, Array], besides: Unrecorded
 def _load(
     scenario: Scenario, record: Mapping[str, Array], start: Array, saturated: Bools
 ) -> dict[str, Any]:
-    """Return how the motors share the load over the window, and how often they were clipped."""
+    """Return how the motors share the load over the window, and how often they are clipped."""
     window = scenario.window
     path = scenario.path
     h = scenario.sim.timestep
     torque = motors(record, "torque")
     theta = motors(record, "theta")
+    # The work of a step needs the angles before it too: one row more than the torques.
     turned = np.concatenate([start[None], theta])[window.start : window.stop + 1]
-    begun = np.maximum(record["time"][window] - h, 0.0)  # when the steps began
+    # A step belongs to the phase it starts in; rounding may put the first start below 0.
+    begun = np.maximum(record["time"][window] - h, 0.0)
     phase = stance = None
 
     if path.period is not None:
         phase = path.cycle(begun)
 
+    # With a ground the real stance counts, not the planned one.
     if "ground_z" in record:
         stance = ground.stands(record)[window]
     elif isinstance(path, Gait):
@@ -108,9 +112,9 @@ def _load(
 
 
 def _branch(leg: FiveBar, record: Mapping[str, Array]) -> dict[str, Any]:
-    """Return the branch of the last step, how often it flipped, and when first.
+    """Return the branch after the last step, how often it flipped, and when first.
 
-    Every step is compared with the one before, the first with the leg's own branch.
+    Every step is compared with the one before, the first step with the leg's own branch.
     """
     q = np.stack([record[name] for name in JOINT_COLUMNS], axis=-1)
     signs = np.stack(kinematics.branch(leg, kinematics.chain_points(leg, q)), axis=-1)

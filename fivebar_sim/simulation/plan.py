@@ -1,4 +1,4 @@
-"""Plans: a scenario that was found possible, with all that its simulation needs."""
+"""Plans: a scenario that has been checked, with everything that its simulation needs."""
 
 from __future__ import annotations
 
@@ -21,17 +21,17 @@ from fivebar_sim.simulation import holding
 
 
 class Plan(NamedTuple):
-    """A scenario that was found possible: what the foot shall do, and what the servos are sent.
+    """A checked scenario: the foot's motion, and the commands of the servos.
 
     Attributes:
-        scenario: What was asked for.
-        motion: The foot and the joints at every step.
+        scenario: The scenario.
+        motion: The wanted motion of foot and joints at every step.
         model: The leg's model.
         start: qpos at t = 0, (nq,).
-        pushes: Commands of the actuators that are no motors, the forces on the foot in the scene
-            "payload", at every step [N], (N, 0 or 2).
-        setpoints: What reaches the motors in every step [rad], (N, 2); None where a feedback
-            controller decides on the way.
+        pushes: Commands of the actuators other than the motors: the forces on the foot in the
+            scene "payload", at every step [N], (N, 0 or 2).
+        setpoints: The setpoints that reach the motors in every step [rad], (N, 2); None where a
+            feedback controller decides during the run.
     """
 
     scenario: Scenario
@@ -43,8 +43,9 @@ class Plan(NamedTuple):
 
     @property
     def ctrl(self) -> Array:
-        """The commands of every step, as MuJoCo has them, (N, nu); not of a feedback controller."""
+        """The commands of every step in MuJoCo's order, (N, nu); not with a feedback controller."""
         assert self.setpoints is not None
+        # The motors are a model's last two actuators.
         return np.concatenate([self.pushes, self.setpoints], axis=1)
 
 
@@ -52,9 +53,9 @@ def plan(scenario: Scenario) -> Plan:
     """Return the plan of a scenario, without simulating anything.
 
     Raises:
-        UnreachableError: The path leaves what the leg can reach; says when and where.
+        UnreachableError: The path leaves the leg's workspace; says when and where.
         ConfigError: A controller that plans setpoints of the wrong shape or not finite, a control
-            period that is no whole number of timesteps, or servos that cannot hold the leg.
+            period that is not a whole number of timesteps, or servos that cannot hold the leg.
         GeometryError: A leg that cannot stand on the scene's ground.
     """
     sim = scenario.sim
@@ -67,6 +68,7 @@ def plan(scenario: Scenario) -> Plan:
         force=scenario.foot_force,
         payload=scenario.payload,
     )
+    # Before the model is built, which it does not need.
     holding.check(scenario, wanted)
     start = wanted.q[0]
     pushes = np.empty((scenario.steps, 0))
@@ -75,6 +77,7 @@ def plan(scenario: Scenario) -> Plan:
         start = _above_ground(scenario, scene, start)
 
     if isinstance(scene, Payload):
+        # A step from t to t + h is pushed by the force at t; none starts at the last instant.
         pushes = wanted.force[:-1]
 
     controller = scenario.controller
@@ -90,16 +93,17 @@ def plan(scenario: Scenario) -> Plan:
     setpoints = None if asked else _setpoints(scenario, controller, wanted)
     planned = Plan(scenario, wanted, built, start, pushes, setpoints)
 
+    # Called for its check alone: a bad period is refused now, not during the run.
     if asked:
         period_steps(planned)
     return planned
 
 
 def _above_ground(scenario: Scenario, scene: Ground, q: Array) -> Array:
-    """Return qpos of a leg whose foot is at the scene's height over the floor, (5,).
+    """Return qpos of a leg with its foot at the scene's height above the floor, (5,).
 
     Raises:
-        ConfigError: The rail ends above that.
+        ConfigError: The rail ends above the hip.
     """
     height = model.standing(scenario.leg, q) + scene.drop
     if scene.stop is not None and not scene.stop <= height:
@@ -111,7 +115,7 @@ def _above_ground(scenario: Scenario, scene: Ground, q: Array) -> Array:
 
 
 def _setpoints(scenario: Scenario, controller: Setpoints, wanted: Motion) -> Array:
-    """Return the setpoints that the scenario's controller plans, checked, as they arrive."""
+    """Return the setpoints that the scenario's controller plans, checked and sent over the bus."""
     name = scenario.controller_name
     shape = (scenario.steps, 2)
     integrator = scenario.sim.integrator
@@ -125,15 +129,16 @@ def _setpoints(scenario: Scenario, controller: Setpoints, wanted: Motion) -> Arr
         )
 
     bus = Bus([scenario.servo], "position", timestep=scenario.sim.timestep, steps=scenario.steps)
+    # Until the first setpoint arrives the servos hold the start pose.
     bus.restart(np.arange(1), wanted.q[:1, ::2])
     return bus.send_all(ctrl[None].astype(np.float64))[0]
 
 
 def period_steps(plan: Plan) -> int:
-    """Return the timesteps of a plan's control period.
+    """Return the timesteps in a plan's control period.
 
     Raises:
-        ArgumentError: It is no whole number of them.
+        ArgumentError: The period is not a whole number of timesteps.
     """
     controller = cast(Feedback, plan.scenario.controller)
     return whole_steps("controller.period", controller.period, plan.motion.timestep)

@@ -1,4 +1,4 @@
-"""The record of a run: the columns of rollout.parquet, from the states that were simulated."""
+"""The record of a run: the columns of rollout.parquet, from the simulated states."""
 
 from __future__ import annotations
 
@@ -19,20 +19,20 @@ from fivebar_sim.simulation.steps import States
 
 
 def columns(planned: Plan, states: States, begin: int = 0) -> Record:
-    """Return the record: row k is the state at t = (k + 1) h, and what the step to it did.
-
-    Foot and gap are those of qpos itself, not MuJoCo's kinematics of the step before.
+    """Return the record: row k is the state at t = (k + 1) h, with the torques of the step to it.
 
     Args:
-        planned: What was simulated.
-        states: Of this one simulation, of all its steps or of some.
-        begin: The step that the first of them is; after 0, the torque of that one is not known,
-            and is the one of a step from where the leg should have been, at rest.
+        planned: The plan that was simulated.
+        states: The states of this one simulation, all steps or some.
+        begin: Index of the first of these states. If above 0, the state before it is not known:
+            its torque is computed as if the leg had been at rest in the planned pose.
     """
     leg = planned.scenario.leg
     wanted = planned.motion
     q, v, ctrl = _joints(states)
+    # Foot and gap from qpos itself: MuJoCo's site positions are those before the step.
     points = kinematics.chain_points(leg, q)
+    # The plan starts at t = 0, the states one step later.
     rows = slice(begin + 1, begin + len(q) + 1)
     target = wanted.foot[rows]
     gap = points.C_right - points.C_left
@@ -51,6 +51,7 @@ def columns(planned: Plan, states: States, begin: int = 0) -> Record:
     record["gap"] = np.hypot(gap[:, 0], gap[:, 1])
     record |= _surroundings(planned, states, begin)
 
+    # Columns of a matrix are strided views: copied, each lies in one piece of memory of its own.
     return {name: np.ascontiguousarray(column) for name, column in record.items()}
 
 
@@ -60,13 +61,14 @@ def _joints(states: States) -> tuple[Array, Array, Array]:
 
 
 def _before(planned: Plan, states: States, begin: int = 0) -> tuple[Array, Array]:
-    """Return motor angles and rates before each step; the run starts at rest."""
+    """Return motor angles and rates before each step, the first at rest in the planned pose."""
     q, v, _ = _joints(states)
     q = np.concatenate([planned.motion.q[begin : begin + 1], q[:-1]])
     return q[:, MOTOR_JOINTS], np.concatenate([np.zeros((1, 4)), v[:-1]])[:, MOTOR_JOINTS]
 
 
 def _drive(planned: Plan) -> Drive:
+    # A controller that plans has no `drive`: its setpoints are angles.
     return getattr(planned.scenario.controller, "drive", "position")
 
 
@@ -86,7 +88,8 @@ def _torque(planned: Plan, states: States, begin: int) -> Array:
 
 
 def unrecorded(planned: Plan, states: States) -> Unrecorded:
-    """Return what a run did besides its record."""
+    """Return the per-step data that the metrics need and the record leaves out."""
+    # The motors are the last two actuators; the others push the foot.
     pushes = states.ctrl[0, :, :-2]
     limit = planned.model.opt.iterations
     return Unrecorded(
@@ -104,13 +107,14 @@ def saturated(planned: Plan, states: States) -> Bools:
 
 
 def _surroundings(planned: Plan, states: States, begin: int) -> Record:
-    """Return the columns of what the leg hangs on and stands on."""
+    """Return the columns of hip, ground and belt, where the scene has them."""
     scene = planned.scenario.scene
     steps = states.time.shape[1]
     record: Record = {}
     if isinstance(scene, Ground):
         record |= {"hip_z": states.qpos[0, :, 0], "hip_dot_z": states.qvel[0, :, 0]}
         record |= {"ground_x": states.ground[0, :, 0], "ground_z": states.ground[0, :, 1]}
+    # A positive belt speed runs towards -x.
     if isinstance(scene, Treadmill):
         record["belt_x"] = (
             -(scene.speed or 0.0) * planned.motion.time[begin + 1 : begin + steps + 1]
@@ -119,8 +123,9 @@ def _surroundings(planned: Plan, states: States, begin: int) -> Record:
 
 
 def broken(planned: Plan, states: States, error: DivergedError) -> DivergedError:
-    """Return the error of a run that broke down: when the foot left its path, and what then."""
-    with np.errstate(all="ignore"):  # angles that overflow are no place near the path
+    """Return the error of a run that broke down: when the foot left its path, and the cause."""
+    # The states of a breakdown may overflow; such an angle counts as off the path.
+    with np.errstate(all="ignore"):
         left = left_path(planned.scenario.leg, columns(planned, states), error.time)
     name = planned.scenario.name
     return DivergedError(f"{name}: the foot left its path at t = {left:g} s; {error}", left)
