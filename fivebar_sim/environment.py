@@ -19,7 +19,7 @@ from fivebar_sim.geometry import FiveBar
 from fivebar_sim.render import gl
 from fivebar_sim.tasks import Randomise, Task
 from fivebar_sim.tasks.episodes import Episodes
-from fivebar_sim.tasks.legs import prepared
+from fivebar_sim.tasks.legs import prepare
 
 if TYPE_CHECKING:
     from dm_control.rl import control
@@ -59,7 +59,7 @@ def load(
 
     named = options if leg is None else {"leg": leg, **options}
     wanted = tasks.task(task, **named).resolved()
-    drawn, models, starts = prepared(wanted, [model_seed], randomise)
+    drawn, models, starts = prepare(wanted, [model_seed], randomise)
     return dm_leg.environment(
         models[0],
         Episodes(wanted, drawn, starts),

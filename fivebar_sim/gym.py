@@ -101,7 +101,7 @@ class LegEnv(gymnasium.Env[Array, Array]):
         Raises:
             ArgumentError: An action that is none of the action space.
         """
-        values = self.episodes.checked(action, self.episodes.low.shape)
+        values = self.episodes.check_action(action, self.episodes.low.shape)
         outcome = self._group.step(values[None])
         observation, info = _row(outcome)
         over = bool(outcome.terminated[0]), bool(outcome.truncated[0])

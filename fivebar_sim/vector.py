@@ -109,7 +109,7 @@ class LegVectorEnv(VectorEnv[Array, Array, Any]):
         Raises:
             ArgumentError: Actions that are none of the action space.
         """
-        values = self.episodes.checked(actions, (self.num_envs, len(self.episodes.low)))
+        values = self.episodes.check_action(actions, (self.num_envs, len(self.episodes.low)))
         outcome = self._group.step(values)
         info = {"terms": outcome.terms, "reason": REASONS[outcome.reason]}
         return (

@@ -22,7 +22,7 @@ from fivebar_sim.arrays import Array
 from fivebar_sim.control.servo import Servo
 from fivebar_sim.scenario import Scenario
 from fivebar_sim.tasks import Hop
-from fivebar_sim.tasks.base import turning
+from fivebar_sim.tasks.base import clock_hand
 from fivebar_sim.vector import LegVectorEnv
 
 OUT = Path(__file__).resolve().parent.parent / "docs" / "hop-training.svg"
@@ -141,7 +141,7 @@ def excess(legs: LegVectorEnv, weights: Array) -> Array:
 
     Without it larger weights would be all the same: setpoints that jump from bound to bound.
     """
-    phase = turning(np.arange(100) / 100.0)
+    phase = clock_hand(np.arange(100) / 100.0)
     wish = wished(legs, weights, np.tile(phase, (len(weights), 1, 1)))
     beyond = wish - np.clip(wish, legs.episodes.low, legs.episodes.high)
     return (beyond**2).sum(axis=-1).mean(axis=-1)

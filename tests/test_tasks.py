@@ -227,7 +227,7 @@ def test_a_warning_is_a_break_and_the_state_stays() -> None:
     episodes = Episodes(task, [task, task], np.stack([starts(task)] * 2))
     before = episodes.qpos.copy()
     rest = np.repeat(before[:, None], task.every, axis=1)
-    episodes.moved(rest + 1e-4, 0.0 * rest, np.array([0, 1]))
+    episodes.update(rest + 1e-4, 0.0 * rest, np.array([0, 1]))
     assert REASONS[episodes.outcome().reason].tolist() == ["", "broken"]
     np.testing.assert_array_equal(episodes.qpos, before + np.array([[1e-4], [0.0]]))
 

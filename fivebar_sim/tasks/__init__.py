@@ -1,4 +1,4 @@
-"""Tasks for an agent: what the leg shall do, what is seen, what is rewarded, when it is over.
+"""Tasks for a learning agent: goal, observation, reward, and when an episode ends.
 
 Pure NumPy over many legs at once. A task is a frozen table of numbers with a `kind`, like a scene.
 """
@@ -42,14 +42,14 @@ KINDS: dict[str, type[Task]] = {
 
 
 def task(kind: str | Task, **options: Any) -> Task:
-    """Return the task of a kind.
+    """Return a task of the given kind.
 
     Args:
-        kind: "track", "stand", "hop" or "gait"; or a task, to change.
-        options: Its attributes; leg and servo also by a preset's name or a TOML file's path.
+        kind: "track", "stand", "hop" or "gait"; or a task to change.
+        options: Attributes of the task; leg and servo also as a preset's name or a TOML file.
 
     Raises:
-        ArgumentError: Unknown kind or option, or one out of its range.
+        ArgumentError: Unknown kind or option, or a value out of range.
         ConfigError: Unknown preset of leg or servo.
     """
     if not isinstance(kind, Task) and kind not in KINDS:
@@ -61,6 +61,7 @@ def task(kind: str | Task, **options: Any) -> Task:
             what = f"option of task {known.__struct_config__.tag!r}"
             raise ArgumentError(unknown(what, name, known.__struct_fields__))
 
+    # So that gymnasium.make("fivebar/Track-v0", leg="q8bot") needs no import of ours.
     for name, preset in (("leg", FiveBar), ("servo", Servo)):
         if name in options and not isinstance(options[name], preset):
             options[name] = preset.load(options[name])

@@ -1,4 +1,4 @@
-"""What every task has: a leg and how it is driven, actions, observations, rewards, an end."""
+"""The base of all tasks: leg and servos, actions, observations, rewards, the episode's length."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ Action = Literal["position", "motion", "torque"]
 ACTIONS: tuple[str, ...] = get_args(Action)
 
 FASTEST = 40.0
-"""Bound of rate setpoints where the servo has no no-load speed [rad/s]."""
+"""Bound of rate setpoints if the servo has no no-load speed [rad/s]."""
 
 LONGEST = 1000.0
 """Upper end of a duration [s]."""
@@ -38,8 +38,8 @@ class Part(NamedTuple):
     """A named part of an observation or an action.
 
     Attributes:
-        size: How many numbers.
-        unit: "" for pure numbers.
+        size: Count of its numbers.
+        unit: Their unit, "" for pure numbers.
     """
 
     size: int
@@ -47,25 +47,25 @@ class Part(NamedTuple):
 
 
 class Task(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True, tag_field="kind"):
-    """A task; the base of every kind.
+    """The base of every kind of task.
 
-    An episode starts at rest near the start of the foot path; the targets at a control step are
-    those of its time.
+    An episode starts at rest near the start of the foot path; the targets of a control step are
+    those of the path at its time.
 
     Attributes:
         leg: The leg.
         servo: The servos at A and E.
-        sensors: What is seen of their angles and rates; all else that is seen is exact.
-        path: The foot's path, at whose start the foot starts; None is the kind's own for the leg.
+        sensors: Sensors of the motors' angles and rates; the rest of the observation is exact.
+        path: The foot's path, at whose start the foot starts; None for the kind's default path.
         action: "position" setpoints (A, E) [rad]; "motion": with rates after them [rad/s], as
             theta + (damping / kp) theta_dot, which takes the servo's lag out; "torque" [N m].
         span: How far position setpoints may be from the rest pose [rad].
         spread: How far the foot may start from the path's start [m].
-        period: Of control [s], a whole number of timesteps.
-        duration: Of an episode [s], a whole number of periods.
+        period: Control period [s], a whole number of timesteps.
+        duration: Length of an episode [s], a whole number of periods.
         timestep: h of the physics [s].
-        integrator: MuJoCo's, "discrete" or "implicitfast".
-        weights: Of reward terms, where they are not those of `WEIGHTS`.
+        integrator: MuJoCo's integrator, "discrete" or "implicitfast".
+        weights: Weights of reward terms that differ from `WEIGHTS`.
     """
 
     WEIGHTS: ClassVar[dict[str, float]] = {}
@@ -73,6 +73,7 @@ class Task(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
     TARGETS: ClassVar[dict[str, Part]] = {}
     """The observation's parts that are known before the episode."""
     GROUNDED: ClassVar[bool] = False
+    """Whether the leg stands on a ground."""
 
     leg: FiveBar = FiveBar(name="classic")
     servo: Servo = Servo()
@@ -85,6 +86,7 @@ class Task(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
     duration: float = 4.0
     timestep: float = 0.001
     integrator: Integrator = "discrete"
+    # msgspec copies an empty default: objects do not share it.
     weights: dict[str, float] = {}
 
     def __post_init__(self) -> None:
@@ -101,6 +103,7 @@ class Task(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
         whole_steps("period", self.period, self.timestep)
         check_number("duration", self.duration, "s", low=0.0, high=LONGEST, strict=True)
         periods = round(self.duration / self.period)
+        # To a part in a million, as in `whole_steps`: decimals are rounded as floats.
         if periods < 1 or abs(periods * self.period - self.duration) > 1e-6 * self.duration:
             raise ArgumentError(
                 f"duration must be a whole number of periods of {self.period:g} s, "
@@ -114,27 +117,27 @@ class Task(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
 
     @property
     def kind(self) -> str:
-        """Its name."""
+        """Name of the kind."""
         return str(self.__struct_config__.tag)
 
     @property
     def every(self) -> int:
-        """Timesteps of a control period."""
+        """Timesteps in a control period."""
         return round(self.period / self.timestep)
 
     @property
     def periods(self) -> int:
-        """Control periods of an episode."""
+        """Control periods in an episode."""
         return round(self.duration / self.period)
 
     @property
     def times(self) -> Array:
-        """The times of an episode's control steps, its end included [s], (periods + 1,)."""
+        """The times of an episode's control steps, including its end [s], (periods + 1,)."""
         return np.arange(self.periods + 1, dtype=np.float64) * self.period
 
     @property
     def drive(self) -> Drive:
-        """What the motors are sent."""
+        """Whether the motors are sent angles or torques."""
         return "torque" if self.action == "torque" else "position"
 
     @property
@@ -149,11 +152,11 @@ class Task(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
 
     @property
     def foot_path(self) -> FootPath:
-        """The path, the kind's own where none was given."""
+        """The path, or the kind's default path if none was given."""
         raise NotImplementedError
 
     def resolved(self) -> Self:
-        """Return the task with its path spelt out, whatever its leg becomes."""
+        """Return the task with its default path spelt out, so that another leg keeps it."""
         return msgspec.structs.replace(self, path=self.foot_path)
 
     @property
@@ -201,11 +204,11 @@ class Task(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
         raise NotImplementedError
 
     def observation(self, seen: Observation, now: Motion, targets: Array) -> Array:
-        """Return the observations of legs, their parts one after the other, (n, size).
+        """Return the observations of n legs, all parts joined, (n, size).
 
         Args:
-            seen: What their sensors say.
-            now: What they are doing.
+            seen: Readings of the legs' sensors.
+            now: State of the legs.
             targets: The parts TARGETS, joined, (n, size of them).
         """
         ground = [now.hip, now.contact[:, None]] if self.GROUNDED else []
@@ -226,7 +229,7 @@ class Grounded(Task, frozen=True):
     """A task on the ground; the hip rides on a rail.
 
     Attributes:
-        mass: Of the trunk that rides on the hip [kg].
+        mass: Mass of the trunk on the hip [kg].
         friction: Coulomb's coefficient between foot and floor.
         drop: Height of the foot above the floor at the start [m].
     """
@@ -239,27 +242,29 @@ class Grounded(Task, frozen=True):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        Ground(mass=self.mass, friction=self.friction, drop=self.drop)  # checks them
+        # Made for its checks alone: a task allows what its scene allows.
+        Ground(mass=self.mass, friction=self.friction, drop=self.drop)
 
 
 def effort(now: Motion) -> Array:
-    """Return the mean square of both motors' torque over the control period [N^2 m^2], (n,)."""
+    """Return mean |tau|^2 of both motors over the control period [N^2 m^2], (n,)."""
     return np.einsum("nkj,nkj->n", now.torque, now.torque) / now.torque.shape[1]
 
 
-def near(error: Array, scale: float) -> Array:
-    """Return exp(-|error|^2 / scale^2) of vectors (n, k): 1 where it is zero, (n,)."""
+def closeness(error: Array, scale: float) -> Array:
+    """Return exp(-|error|^2 / scale^2) of vectors (n, k): 1 for no error, (n,)."""
     return np.exp(-np.einsum("nk,nk->n", error, error) / scale**2)
 
 
-def turning(cycle: Array) -> Array:
-    """Return (cos, sin) of a clock's cycles, (..., 2)."""
+def clock_hand(cycle: Array) -> Array:
+    """Return (cos, sin) of a clock's cycle, counted in turns, (..., 2)."""
+    # Two numbers, since one angle would jump by a turn once a period.
     angle = 2.0 * np.pi * cycle
     return np.stack([np.cos(angle), np.sin(angle)], axis=-1)
 
 
-def periodic(path: FootPath, time: Array) -> Array:
-    """Return (cos, sin) of where in its period a path is, (..., 2).
+def phase(path: FootPath, time: Array) -> Array:
+    """Return (cos, sin) of a path's phase within its period, (..., 2).
 
     Raises:
         ConfigError: A path without a period.
@@ -267,4 +272,4 @@ def periodic(path: FootPath, time: Array) -> Array:
     if path.period is None:
         kind = path.__struct_config__.tag
         raise ConfigError(f"the path must be a periodic one, for its phase; got kind {kind!r}")
-    return turning(path.cycle(time))
+    return clock_hand(path.cycle(time))

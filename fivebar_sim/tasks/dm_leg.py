@@ -1,4 +1,4 @@
-"""A leg as dm_control's physics and task; import it after `gl.settle()`."""
+"""The leg as dm_control's Physics and Task; import it after `gl.settle()`."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ from fivebar_sim.tasks.episodes import Episodes, Outcome
 
 
 class LegPhysics(Physics):
-    """A leg; its commands of every step are set before `step`, and its states kept after it.
+    """A leg that is given the commands of every step before `step`, and keeps the states after it.
 
     Attributes:
-        ctrl: Of the next steps, (n, nu).
-        qpos, qvel: After each of the last steps, (n, nq).
+        ctrl: Commands of the next n steps, (n, nu).
+        qpos, qvel: States after each of the last n steps, (n, nq).
     """
 
     legacy_step = False
@@ -33,7 +33,8 @@ class LegPhysics(Physics):
     qvel: Array
 
     def step(self, nstep: int = 1) -> None:
-        """Advance by steps, each with its row of ctrl, the last row repeated."""
+        """Take nstep steps, each with its row of ctrl; the last row is repeated."""
+        # mj_step takes MuJoCo's own objects, not dm_control's wrappers of them.
         model = self.model.ptr
         data = self.data.ptr
         self.qpos = np.empty((nstep, model.nq))
@@ -47,20 +48,20 @@ class LegPhysics(Physics):
 
     @property
     def warnings(self) -> int:
-        """MuJoCo's, since the reset."""
+        """Number of MuJoCo's warnings since the reset."""
         return int(self.data.ptr.warning.number.sum())
 
 
 class LegTask(control.Task):
-    """A `Task` as dm_control asks for it.
+    """One of our tasks behind dm_control's interface.
 
     Args:
-        episodes: Of one leg.
-        random: What starts and noise are drawn from.
+        episodes: The episodes of one leg.
+        random: Generator of starts and sensor noise.
 
     Attributes:
-        episodes: What has become of the leg.
-        outcome: The last one, with its reward terms.
+        episodes: The episodes of the leg.
+        outcome: The last outcome, with its reward terms.
     """
 
     outcome: Outcome
@@ -83,19 +84,20 @@ class LegTask(control.Task):
         Raises:
             ArgumentError: An action that does not conform to the action spec.
         """
-        values = self.episodes.checked(action, self.episodes.low.shape)
+        values = self.episodes.check_action(action, self.episodes.low.shape)
         physics.ctrl = self.episodes.commands(values[None])[0]
 
     def after_step(self, physics: LegPhysics) -> None:
-        """Take note of the period's states."""
+        """Report the period's states to the episodes."""
         warnings = np.array([physics.warnings])
-        self.episodes.moved(physics.qpos[None], physics.qvel[None], warnings)
+        self.episodes.update(physics.qpos[None], physics.qvel[None], warnings)
         self.outcome = self.episodes.outcome()
 
     def action_spec(self, physics: LegPhysics) -> Any:
-        """Return the shape and the bounds of actions; the name says their parts."""
+        """Return the shape and the bounds of actions; the name lists their parts."""
         low = self.episodes.low
         high = self.episodes.high
+        # Separated by tabs, as in the specs of dm_control's own physics.
         name = "\t".join(f"{name}_{motor}" for name in self.episodes.task.actions for motor in "AE")
         return specs.BoundedArray(low.shape, np.float64, low, high, name)
 
@@ -114,7 +116,8 @@ class LegTask(control.Task):
         return float(self.outcome.reward[0])
 
     def get_termination(self, physics: LegPhysics) -> Any:
-        """Return the discount at an end, 0 unless it is the duration's, and None before."""
+        """Return the discount at the end of an episode, None before it."""
+        # Only time ran out: the agent may bootstrap from the last state, so the discount is 1.
         if self.outcome.truncated[0]:
             return 1.0
         return 0.0 if self.outcome.terminated[0] else None

@@ -1,7 +1,7 @@
 """Episodes of many legs at one task: actions in, observations, rewards and ends out; no physics.
 
-Whoever steps the physics, `mujoco.batch` or dm_control, asks `commands`, reports with `moved`, and
-reads `outcome`. Nothing here is done leg by leg but what a restart draws.
+The code that steps the physics, with `mujoco.batch` or dm_control, asks for `commands`, reports the
+states with `update`, and reads `outcome`. Only the draws of a restart are done leg by leg.
 """
 
 from __future__ import annotations
@@ -22,19 +22,19 @@ from fivebar_sim.tasks.base import Part, Task
 from fivebar_sim.tasks.motion import TIME, motion
 
 MOTORS = [-4, -2]
-"""Where qpos and qvel have A and E."""
+"""Indices of A and E in qpos and qvel, counted from the end: the hip's height may come first."""
 
 
 class Outcome(NamedTuple):
     """What agents get after a control period, or at the start of an episode.
 
     Attributes:
-        observation: (n, size).
+        observation: The observations, (n, size).
         reward: Weighted sum of the terms, (n,).
-        terms: By name, (n,) each.
-        terminated: Whether a leg is beyond what it may do, (n,).
+        terms: Reward terms by name, (n,) each.
+        terminated: Whether a leg has failed, and why see `reason`, (n,).
         truncated: Whether the episode's duration is over, (n,).
-        reason: Number in REASONS, (n,).
+        reason: Index in REASONS, (n,).
     """
 
     observation: Array
@@ -46,12 +46,12 @@ class Outcome(NamedTuple):
 
 
 class Episodes:
-    """Episodes of legs.
+    """Episodes of n legs at one task.
 
     Args:
-        task: What they shall do; scales, bounds and targets are those of its leg.
-        drawn: The same task with each leg's own numbers, n.
-        starts: Poses at rest that an episode may start in, of each leg, (n, m, nq).
+        task: The nominal task; its leg sets scales, bounds and targets for all.
+        drawn: The same task with each leg's own numbers, n of them.
+        starts: Poses at rest that each leg's episodes may start in, (n, m, nq).
 
     Attributes:
         size: n.
@@ -88,12 +88,13 @@ class Episodes:
         )
 
     def begin(self, rows: NDArray[np.int64], random: Sequence[np.random.Generator]) -> Array:
-        """Return qpos at which some legs begin an episode, at rest, (k, nq).
+        """Start episodes of some legs and return their qpos, at rest, (k, nq).
 
         Args:
-            rows: Which, (k,).
-            random: Of each of them: the start and the sensors' noise are drawn from it.
+            rows: Indices of those legs, (k,).
+            random: A generator for each of them, for its start and its sensor noise.
         """
+        # Another order of these draws would make other episodes of the same seeds.
         which = [int(generator.integers(self._starts.shape[1])) for generator in random]
         seeds = [int(generator.integers(2**63)) for generator in random]
         qpos = self._starts[rows, which]
@@ -106,16 +107,17 @@ class Episodes:
         self._control.restart(rows, qpos[:, MOTORS], seeds)
         return qpos
 
-    def checked(self, action: object, shape: tuple[int, ...]) -> Array:
-        """Return an action as it came, checked.
+    def check_action(self, action: object, shape: tuple[int, ...]) -> Array:
+        """Return an action as an array, unchanged.
 
         Raises:
-            ArgumentError: Not finite numbers of the shape within the bounds: nothing is clipped.
+            ArgumentError: Not finite numbers of that shape within the bounds; nothing is clipped.
         """
         values = as_vectors(np.asarray(action), "action", len(self.low))
         if values.shape != shape:
             raise ArgumentError(f"action must have shape {shape}, got {values.shape}")
 
+        # Written so that NaN is outside too.
         outside = ~((values >= self.low) & (values <= self.high))
         if outside.any():
             index = tuple(int(i) for i in np.argwhere(outside)[0])
@@ -133,31 +135,35 @@ class Episodes:
         """Return what reaches the motors in each step of the next control period, (n, every, 2).
 
         Args:
-            action: Checked, (n, size).
+            action: A checked action, (n, size).
         """
         command = action
         if self.task.action == "motion":
+            # A servo lags its setpoint by damping / kp times the rate: so much is put on top.
             lead = (self._servo.damping / self._servo.kp)[:, 0]
             command = action[:, :2] + lead * action[:, 2:]
-        periods = np.minimum(self._count, self.task.periods - 1)  # those that are over wait
+        # A leg whose episode is over is stepped on with the others; the bus has no later period.
+        periods = np.minimum(self._count, self.task.periods - 1)
         self._ctrl = self._control.send(periods * self.task.every, command)
         return self._ctrl
 
-    def moved(self, qpos: Array, qvel: Array, warnings: NDArray[Any]) -> None:
-        """Take note of the states after each step of a control period.
+    def update(self, qpos: Array, qvel: Array, warnings: NDArray[Any]) -> None:
+        """Take over the states after each step of a control period.
 
-        A leg whose physics broke down stays as it was a period before.
+        A leg whose physics broke down keeps its state of a period before.
 
         Args:
-            qpos: (n, every, nq).
-            qvel: (n, every, nq).
-            warnings: MuJoCo's, since the leg began, (n,).
+            qpos: Positions, (n, every, nq).
+            qvel: Rates, (n, every, nq).
+            warnings: Number of MuJoCo's warnings since the leg's start, (n,).
         """
-        sound = np.abs(qvel).max(axis=(1, 2)) < SPEED_LIMIT  # NaN is not
+        # A comparison with NaN is False, so NaN is unsound too.
+        sound = np.abs(qvel).max(axis=(1, 2)) < SPEED_LIMIT
         self._broken = ~(sound & np.isfinite(qpos).all(axis=(1, 2)) & (warnings == 0))
         q = qpos[..., MOTORS]
         v = qvel[..., MOTORS]
 
+        # Agents must never see NaN: the observation after a breakdown is that of the period before.
         if self._broken.any():
             bad = self._broken[:, None, None]
             qpos = np.where(bad, self.qpos[:, None], qpos)
@@ -174,17 +180,19 @@ class Episodes:
             self._servo, task.integrator, self._ctrl, *before, q, v, task.drive
         )
         self._control.moved(q, v)
+        # Copies: a view of the last step would keep all steps of the period in memory.
         self.qpos = qpos[:, -1].copy()
         self.qvel = qvel[:, -1].copy()
         self._count += 1
         self._fresh[:] = False
 
     def outcome(self) -> Outcome:
-        """Return what agents get; of legs that have just begun, no reward and no end."""
+        """Return what agents get; legs that have just started have no reward and no end."""
         task = self.task
         now = motion(self._leg, self.qpos, self.qvel, self._torque, self._broken)
         targets = self._targets[np.minimum(self._count, task.periods)]
         seen = self._control.observe(self._count * task.every)
+        # A fresh leg has run no period that could be rewarded.
         ran = ~self._fresh
         terms = {name: term * ran for name, term in task.terms(now, targets).items()}
         reward = np.zeros(self.size)
@@ -194,6 +202,7 @@ class Episodes:
 
         reason = now.reason * ran
         terminated = reason > 0
+        # A leg that fails in the last period has failed: its discount is 0, not 1.
         truncated = ~terminated & (self._count >= task.periods)
         reason[truncated] = TIME
         observation = task.observation(seen, now, targets)
@@ -202,7 +211,7 @@ class Episodes:
 
 
 def part_at(parts: dict[str, Part], index: int) -> tuple[str, str, int]:
-    """Return name, unit and number within it of the part that holds an index."""
+    """Return the name and unit of the part that holds an index, and the index within the part."""
     for name, part in parts.items():
         if index < part.size:
             return name, part.unit, index

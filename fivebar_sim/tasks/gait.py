@@ -8,7 +8,7 @@ from fivebar_sim import paths
 from fivebar_sim.arrays import Array
 from fivebar_sim.errors import ConfigError
 from fivebar_sim.scenario.scenes import Scene, Treadmill
-from fivebar_sim.tasks.base import Grounded, Part, effort, near, periodic
+from fivebar_sim.tasks.base import Grounded, Part, closeness, effort, phase
 from fivebar_sim.tasks.motion import Motion
 
 
@@ -18,8 +18,8 @@ class Gait(Grounded, frozen=True, tag="gait"):
         tracking = exp(-|F - F*|^2 / (0.1 size)^2),   effort = mean |tau|^2
         slip = (F_dot_x + v)^2 where the foot touches the belt, else 0
 
-    In swing the trunk sits on the rail's end, a hundredth of the size lower than in stance. Its own
-    path is a trot below the rest pose: stride 0.4 size, lift 0.15 size, twice a second.
+    In swing the trunk rests on the rail's end, a hundredth of the size lower than in stance. The
+    default path is a trot below the rest pose: stride 0.4 size, lift 0.15 size, twice a second.
     """
 
     WEIGHTS: ClassVar[dict[str, float]] = {"tracking": 1.0, "slip": -1.0, "effort": -0.1}
@@ -50,7 +50,7 @@ class Gait(Grounded, frozen=True, tag="gait"):
 
     @property
     def foot_path(self) -> paths.Gait:
-        """The path, or the trot."""
+        """The path, or the default trot."""
         if self.path is not None:
             assert isinstance(self.path, paths.Gait)
             return self.path
@@ -74,14 +74,15 @@ class Gait(Grounded, frozen=True, tag="gait"):
         return {
             "target": wanted.position,
             "target_dot": wanted.velocity,
-            "phase": periodic(path, time),
+            "phase": phase(path, time),
         }
 
     def terms(self, now: Motion, targets: Array) -> dict[str, Array]:
         """Return the reward terms, (n,) each."""
+        # The belt runs towards -x, so a foot at rest on it has minus the stance speed.
         slip = now.foot_dot[:, 0] + self.foot_path.stance_speed
         return {
-            "tracking": near(now.foot - targets[:, :2], 0.1 * self.leg.size),
+            "tracking": closeness(now.foot - targets[:, :2], 0.1 * self.leg.size),
             "slip": slip**2 * now.contact,
             "effort": effort(now),
         }

@@ -11,24 +11,24 @@ from fivebar_sim.checks import check_number
 from fivebar_sim.paths import FootPath
 from fivebar_sim.paths.base import FASTEST
 from fivebar_sim.scenario.scenes import Rail, Scene
-from fivebar_sim.tasks.base import Grounded, Part, effort, turning
+from fivebar_sim.tasks.base import Grounded, Part, clock_hand, effort
 from fivebar_sim.tasks.motion import Motion
-from fivebar_sim.tasks.stand import held
+from fivebar_sim.tasks.stand import hold
 
 
 class Hop(Grounded, frozen=True, tag="hop"):
-    """Bring the foot high above the floor, on the rail, again and again.
+    """Hop on the rail: bring the foot high above the floor, again and again.
 
         flight = min(height / target, 1) where the foot is above the floor, else 0
         effort = mean |tau|^2
 
-    The phase is that of a clock which the agent may hop by. Its own path holds the foot in a
+    The phase is that of a clock which the agent may hop by. The default path holds the foot in a
     crouch, 0.16 size above the rest pose.
 
     Attributes:
-        target: Height of the foot's ball above the floor that is rewarded in full [m]; None is
+        target: Height of the foot's ball above the floor that earns the full reward [m]; None for
             0.3 size.
-        frequency: Of the clock [Hz].
+        frequency: Frequency of the clock [Hz].
     """
 
     WEIGHTS: ClassVar[dict[str, float]] = {"flight": 1.0, "effort": -0.5}
@@ -51,18 +51,20 @@ class Hop(Grounded, frozen=True, tag="hop"):
 
     @property
     def foot_path(self) -> FootPath:
-        """The path, or the crouch."""
-        return self.path or held(self.home + np.array([0.0, 0.16 * self.leg.size]))
+        """The path, or the default crouch."""
+        return self.path or hold(self.home + np.array([0.0, 0.16 * self.leg.size]))
 
     def targets(self) -> dict[str, Array]:
         """Return the target height and the clock's phase at each control step."""
         time = self.times
         target = 0.3 * self.leg.size if self.target is None else self.target
-        return {"target": np.full((len(time), 1), target), "phase": turning(time * self.frequency)}
+        phase = clock_hand(time * self.frequency)
+        return {"target": np.full((len(time), 1), target), "phase": phase}
 
     def terms(self, now: Motion, targets: Array) -> dict[str, Array]:
         """Return the reward terms, (n,) each."""
         return {
+            # A sunken foot has a height below 0: it is on the floor and earns nothing.
             "flight": np.clip(now.height / targets[:, 0], 0.0, 1.0),
             "effort": effort(now),
         }

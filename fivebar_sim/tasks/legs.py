@@ -1,4 +1,4 @@
-"""Legs at one task on `mujoco.batch`: one of them is an environment, many a vector of them."""
+"""Legs at one task, stepped by `mujoco.batch`: one leg or many at once."""
 
 from __future__ import annotations
 
@@ -17,23 +17,23 @@ from fivebar_sim.tasks import Randomise, Task
 from fivebar_sim.tasks.episodes import Episodes, Outcome
 
 STARTS = 32
-"""Start poses of a leg; an episode draws one."""
+"""Start poses per leg; each episode draws one of them."""
 
 
 class LegGroup:
-    """Legs that are stepped together through episodes, each begun again after its end.
+    """Legs that are stepped together through episodes; each starts a new one after its end.
 
     Args:
-        task: What they shall do.
-        seeds: Of what each leg draws from `randomise`, (n,).
-        randomise: Ranges of what differs between the legs; None is nothing.
+        task: The task.
+        seeds: Seed of each leg's draw from `randomise`, (n,).
+        randomise: Ranges of the numbers in which legs differ; None for equal legs.
         nthread: Threads; 0 is one for every processor.
 
     Attributes:
-        task: With its path spelt out.
-        drawn: The task with each leg's own numbers, n.
-        models: The legs' models, n.
-        episodes: What has become of them.
+        task: The task, with its path spelt out.
+        drawn: The task with each leg's own numbers, n of them.
+        models: The legs' models, n of them.
+        episodes: The legs' episodes.
 
     Raises:
         UnreachableError: A leg cannot follow the path.
@@ -47,17 +47,17 @@ class LegGroup:
         nthread: int = 1,
     ) -> None:
         self.task = task.resolved()
-        self.drawn, self.models, starts = prepared(self.task, seeds, randomise)
+        self.drawn, self.models, starts = prepare(self.task, seeds, randomise)
         self.episodes = Episodes(self.task, self.drawn, starts)
         self._legs = _Legs(self.models, starts[:, 0], nthread)
         self._over = np.zeros(len(seeds), dtype=bool)
         self._random: list[np.random.Generator] = []
 
     def reset(self, random: Sequence[np.random.Generator]) -> Outcome:
-        """Return the start of a new episode of every leg.
+        """Start a new episode of every leg and return its first outcome.
 
         Args:
-            random: Of each leg, for this and the following episodes.
+            random: A generator for each leg, for this and the following episodes.
         """
         self._random = list(random)
         self._begin(np.arange(self.episodes.size))
@@ -65,15 +65,16 @@ class LegGroup:
         return self.episodes.outcome()
 
     def step(self, action: Array) -> Outcome:
-        """Return what came of an action; a leg whose episode was over begins a new one instead.
+        """Return the outcome of an action; a leg whose episode was over starts a new one instead.
 
         Args:
-            action: Checked, (n, size).
+            action: A checked action, (n, size).
         """
         if not self._random:
             raise ArgumentError("step comes after reset")
         states = self._legs.advance(self.episodes.commands(action))
-        self.episodes.moved(states.qpos, states.qvel, states.warnings)
+        self.episodes.update(states.qpos, states.qvel, states.warnings)
+        # The action of a leg that was over is thrown away: Gymnasium's next-step autoreset.
         if self._over.any():
             self._begin(np.flatnonzero(self._over))
         outcome = self.episodes.outcome()
@@ -86,22 +87,24 @@ class LegGroup:
 
 
 class _Legs(Legs):
-    """Legs of which some are begun again."""
+    """Legs of which some can be started again."""
 
     def restart(self, rows: NDArray[np.int64], qpos: Array) -> None:
         """Put some legs at rest into poses (k, nq)."""
+        # No mj_forward: it would be of the model's default pose, which the next line replaces.
         self._batch.reset(rows, stage=mujoco.mjtStage.mjSTAGE_NONE.value)
         self._batch.qpos[rows] = qpos
 
 
-def prepared(
+def prepare(
     task: Task, seeds: Sequence[int], randomise: Randomise | None
 ) -> tuple[list[Task], list[mujoco.MjModel], Array]:
     """Return the drawn tasks, their models and their start poses (n, STARTS, nq).
 
     Raises:
-        UnreachableError: A leg cannot follow the path; says the seed that it is drawn from.
+        UnreachableError: A leg cannot follow the path; names the seed it was drawn from.
     """
+    # Equal legs share one model and one set of poses.
     if randomise is None:
         one = model_of(task), starts(task)
         return [task] * len(seeds), [one[0]] * len(seeds), np.repeat(one[1][None], len(seeds), 0)
@@ -130,14 +133,15 @@ def model_of(task: Task) -> mujoco.MjModel:
 def starts(task: Task) -> Array:
     """Return poses at rest with the foot near the start of the task's path, (STARTS, nq).
 
-    They fill a disc of radius `spread` evenly, from the path's start outwards: a sunflower's seeds,
-    point i at spread sqrt(i / STARTS) in the direction i (3 - sqrt(5)) pi. On the ground the foot
-    is the task's drop above the floor.
+    They fill a disc of radius `spread` evenly, from the path's start outwards, like the seeds of a
+    sunflower: point i at spread sqrt(i / STARTS) in the direction i (3 - sqrt(5)) pi. On the ground
+    the foot is the task's drop above the floor.
 
     Raises:
         UnreachableError: The leg cannot follow the path, or reach all of that disc.
     """
     steps = task.periods * task.every
+    # The whole episode, so that a path which the leg cannot follow is refused here.
     wanted = motion.plan(task.leg, task.foot_path, steps, task.timestep)
     i = np.arange(STARTS)
     angle = i * (3.0 - np.sqrt(5.0)) * np.pi

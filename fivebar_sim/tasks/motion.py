@@ -1,4 +1,4 @@
-"""What legs are doing at the end of a control period, from qpos and qvel alone."""
+"""The state of legs at the end of a control period, from qpos and qvel alone."""
 
 from __future__ import annotations
 
@@ -15,31 +15,31 @@ from fivebar_sim.kinematics.planar import end_velocity
 from fivebar_sim.kinematics.stops import C_STOP, MOTOR_RANGE, angle_at_C
 
 REASONS = np.array(["", "broken", "gap", "flip", "limit", "time"])
-"""Why an episode is over, by number: not at all; the physics broke down; the loop is open; the leg
-is on another branch; a joint is beyond its range; the task's duration is over."""
+"""Why an episode is over, by number: not over; the physics broke down; the loop is open; the leg is
+on another branch; a joint is out of its range; the task's duration is over."""
 
 TIME = len(REASONS) - 1
 
 WIDEST_GAP = 5e-3
-"""Of the loop, over the leg's size."""
+"""Largest gap of the loop, relative to the leg's size."""
 
 TOUCH = 1e-6
-"""Height of the foot's ball up to which it touches the floor [m]: rounding of a standing pose."""
+"""Height up to which the foot's ball counts as touching [m]: a standing pose is off by rounding."""
 
 
 class Motion(NamedTuple):
-    """States of some legs; foot, contact and gap are of one qpos.
+    """States of n legs, all computed from the same qpos.
 
     Attributes:
         q: Joint angles A, B, E, D [rad], (n, 4).
-        q_dot: [rad/s], (n, 4).
+        q_dot: Their rates [rad/s], (n, 4).
         foot: F, hip frame [m], (n, 2).
-        foot_dot: [m/s], (n, 2).
+        foot_dot: Its velocity [m/s], (n, 2).
         hip: Height of the hip above the floor and its rate [m, m/s], (n, 2); (n, 0) where the hip
             is fixed.
-        height: Of the foot's ball above the floor [m], (n,); inf where the hip is fixed.
-        torque: What the motors gave in each step of the period [N m], (n, every, 2).
-        reason: Why the leg is beyond what it may do, number in REASONS, (n,).
+        height: Height of the foot's ball above the floor [m], (n,); inf where the hip is fixed.
+        torque: Motor torques in each step of the period [N m], (n, every, 2).
+        reason: Why the leg has failed, index in REASONS, 0 if it has not, (n,).
     """
 
     q: Array
@@ -60,17 +60,17 @@ class Motion(NamedTuple):
 def motion(
     leg: FiveBar | LegArrays, qpos: Array, qvel: Array, torque: Array, broken: Bools
 ) -> Motion:
-    """Return what legs are doing.
+    """Return the state of n legs.
 
     The foot's velocity is that of L2, which carries it, with AB and BF the vectors along side A:
 
         F_dot = perp(AB) theta_dot_A + perp(BF) (theta_dot_A + theta_dot_B)
 
     Args:
-        leg: The leg of all rows, or one leg each.
-        qpos: (n, nq): the four joints, before them the hip's height if it moves.
-        qvel: (n, nq).
-        torque: What the motors gave in each step of the period [N m], (n, every, 2).
+        leg: One leg for all rows, or a leg for each.
+        qpos: The four joints, after the hip's height if it moves, (n, nq).
+        qvel: Their rates, (n, nq).
+        torque: Motor torques in each step of the period [N m], (n, every, 2).
         broken: Whether the physics broke down, (n,).
     """
     q = qpos[:, -4:]
@@ -85,19 +85,19 @@ def motion(
         height = hip[:, 0] + p.F[:, 1] - leg.foot_radius
 
     reason = _reason(leg, q, p)
+    # Last: a broken leg shows a sound state, that of the period before.
     reason[broken] = 1
     return Motion(q, q_dot, p.F, foot_dot, hip, height, torque, reason)
 
 
 def _reason(leg: FiveBar | LegArrays, q: Array, p: kinematics.Points) -> NDArray[np.int64]:
-    """Return the numbers of the reasons why poses are none of the leg's, 0 where they are, (n,).
-
-    The angle at C has its stops where the sine of twice the way from straight is that of C_STOP.
-    """
+    """Return why poses are not allowed, as indices in REASONS, 0 where they are allowed, (n,)."""
     gap = p.C_right - p.C_left
     wide = (np.hypot(gap[:, :1], gap[:, 1:]) > WIDEST_GAP * leg.size)[:, 0]
     s_A, s_E, assembly = kinematics.branch(leg, p)
     flipped = (s_A != leg.mode[0]) | (s_E != leg.mode[1]) | (assembly != leg.assembly)
+    # One sine covers both stops, straight and folded, in whatever turn the angle is.
     beyond = np.abs(np.sin(angle_at_C(q))) < np.sin(C_STOP)
     beyond |= (np.abs(q[:, ::2]) > MOTOR_RANGE).any(axis=1)
+    # The cause first, not what follows from it: with an open loop the branch means nothing.
     return np.where(wide, 2, np.where(flipped, 3, np.where(beyond, 4, 0)))

@@ -1,4 +1,4 @@
-"""Legs that differ: masses, lengths, friction, servo gains and delay drawn from ranges."""
+"""Legs that differ: lengths, masses, friction, servo gains and delay drawn from ranges."""
 
 from __future__ import annotations
 
@@ -16,18 +16,18 @@ Range = tuple[float, float]
 
 
 class Randomise(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """Ranges (low, high) that a leg's numbers are drawn from, evenly; all but delay are factors.
+    """Ranges (low, high) from which a leg's numbers are drawn evenly; all but delay are factors.
 
     The defaults leave everything as it is.
 
     Attributes:
-        length: Of L1, L2, L3 and L4, each drawn for itself.
-        mass: Of all links together, inertias included.
-        trunk: Of the trunk's mass; tasks on the ground only.
-        friction: Of foot and floor; tasks on the ground only.
-        kp: Of the servos' position gain.
-        kd: Of their derivative gain.
-        delay: Added to the servos' own [s].
+        length: Factor of L1, L2, L3 and L4, each drawn separately.
+        mass: Factor of all links' masses and inertias, one for all.
+        trunk: Factor of the trunk's mass; tasks on the ground only.
+        friction: Factor of the friction of foot and floor; tasks on the ground only.
+        kp: Factor of the servos' position gain.
+        kd: Factor of the servos' derivative gain.
+        delay: Delay on top of the servos' own [s].
     """
 
     length: Range = (1.0, 1.0)
@@ -51,13 +51,14 @@ class Randomise(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only
             check_number(f"{name}[1]", pair[1], unit, low=float(pair[0]), high=high)
 
     def drawn(self, task: Task, seed: int) -> Task:
-        """Return a task whose leg, servos and ground are drawn, on the same path.
+        """Return a task with its leg, servos and ground drawn, on the same path.
 
         Args:
-            task: The nominal one.
-            seed: Of the draw: equal seeds draw equal legs.
+            task: The nominal task.
+            seed: Seed of the draw: equal seeds draw equal legs.
         """
         random = np.random.default_rng(seed)
+        # Every range takes its draws, wide or not: so widening one leaves the others' numbers.
         factor = {
             name: random.uniform(*getattr(self, name), size=4 if name == "length" else 1).tolist()
             for name in self.__struct_fields__
@@ -80,6 +81,7 @@ class Randomise(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only
             }
 
         leg = _leg(task.leg, factor["length"], factor["mass"][0])
+        # Resolved before the leg is replaced: a default path follows the leg.
         return msgspec.structs.replace(task.resolved(), leg=leg, servo=servo, **ground)
 
 
@@ -87,6 +89,7 @@ def _leg(leg: FiveBar, lengths: list[float], mass: float) -> FiveBar:
     """Return a leg with L1..L4 and its masses multiplied."""
     longer = {f"L{i}": getattr(leg, f"L{i}") * by for i, by in enumerate(lengths, start=1)}
     heavier = {"density": leg.density * mass}
+    # Masses that are given outright do not come from the density.
     if leg.mass is not None:
         heavier = {"mass": tuple(m * mass for m in leg.mass)}
         if leg.inertia is not None:

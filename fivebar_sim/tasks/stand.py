@@ -7,7 +7,7 @@ from typing import ClassVar
 from fivebar_sim.arrays import Array
 from fivebar_sim.paths import FootPath, Step
 from fivebar_sim.scenario.scenes import Rail, Scene
-from fivebar_sim.tasks.base import Grounded, Part, effort, near
+from fivebar_sim.tasks.base import Grounded, Part, closeness, effort
 from fivebar_sim.tasks.motion import Motion
 
 
@@ -17,7 +17,7 @@ class Stand(Grounded, frozen=True, tag="stand"):
         height = exp(-(hip_z - h*)^2 / (0.05 size)^2),   still = hip_dot_z^2
         effort = mean |tau|^2
 
-    Its own path holds the foot in the rest pose.
+    The default path holds the foot in the rest pose.
     """
 
     WEIGHTS: ClassVar[dict[str, float]] = {"height": 1.0, "still": -1.0, "effort": -0.1}
@@ -32,24 +32,26 @@ class Stand(Grounded, frozen=True, tag="stand"):
 
     @property
     def foot_path(self) -> FootPath:
-        """The path, or the hold."""
-        return self.path or held(self.home)
+        """The path, or the default hold."""
+        return self.path or hold(self.home)
 
     def targets(self) -> dict[str, Array]:
         """Return the hip's height h* at each control step."""
+        # With the ball on the floor the hip is as high as the foot is deep, plus the ball's radius.
         foot = self.foot_path.at(self.times).position
         return {"target": self.leg.foot_radius - foot[:, 1:]}
 
     def terms(self, now: Motion, targets: Array) -> dict[str, Array]:
         """Return the reward terms, (n,) each."""
         return {
-            "height": near(now.hip[:, :1] - targets, 0.05 * self.leg.size),
+            "height": closeness(now.hip[:, :1] - targets, 0.05 * self.leg.size),
             "still": now.hip[:, 1] ** 2,
             "effort": effort(now),
         }
 
 
-def held(foot: Array) -> Step:
+def hold(foot: Array) -> Step:
     """Return the path that holds the foot at a point (2,) [m]."""
     x, z = foot.tolist()
+    # A step of no length; past its second it stays held, so any time will do.
     return Step(start=(x, z), stop=(x, z), lift=0.0, seconds=1.0)

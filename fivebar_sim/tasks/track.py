@@ -7,7 +7,7 @@ from typing import ClassVar
 from fivebar_sim.arrays import Array
 from fivebar_sim.paths import Ellipse, FootPath
 from fivebar_sim.scenario.scenes import Air, Scene
-from fivebar_sim.tasks.base import Part, Task, effort, near, periodic
+from fivebar_sim.tasks.base import Part, Task, closeness, effort, phase
 from fivebar_sim.tasks.motion import Motion
 
 
@@ -16,8 +16,8 @@ class Track(Task, frozen=True, tag="track"):
 
         tracking = exp(-|F - F*|^2 / (0.05 size)^2),   effort = mean |tau|^2
 
-    Its own path is an ellipse about the rest pose, 0.4 size by 0.16 size, twice a second: that of
-    the scenario classic-ellipse, half a millimetre higher.
+    The default path is an ellipse about the rest pose, 0.4 size by 0.16 size, twice a second: that
+    of the scenario classic-ellipse, half a millimetre higher.
     """
 
     WEIGHTS: ClassVar[dict[str, float]] = {"tracking": 1.0, "effort": -0.1}
@@ -34,7 +34,7 @@ class Track(Task, frozen=True, tag="track"):
 
     @property
     def foot_path(self) -> FootPath:
-        """The path, or the ellipse."""
+        """The path, or the default ellipse."""
         if self.path is not None:
             return self.path
         x, z = self.home.tolist()
@@ -49,12 +49,12 @@ class Track(Task, frozen=True, tag="track"):
         return {
             "target": wanted.position,
             "target_dot": wanted.velocity,
-            "phase": periodic(path, time),
+            "phase": phase(path, time),
         }
 
     def terms(self, now: Motion, targets: Array) -> dict[str, Array]:
         """Return the reward terms, (n,) each."""
         return {
-            "tracking": near(now.foot - targets[:, :2], 0.05 * self.leg.size),
+            "tracking": closeness(now.foot - targets[:, :2], 0.05 * self.leg.size),
             "effort": effort(now),
         }
