@@ -23,10 +23,10 @@ def listening(address: str) -> str:
     """Return the address as soon as a server listens there."""
     for _ in range(100):
         try:
-            return live.checked(address)
+            return live.check_address(address)
         except ConfigError:
             time.sleep(0.1)
-    return live.checked(address)
+    return live.check_address(address)
 
 
 def measure(address: str) -> tuple[float, float]:
@@ -50,7 +50,7 @@ if __name__ == "__main__":
     bind = ["--serve-grpc", "--bind", viewer.LOOPBACK, "--port", str(PORT)]
     server = subprocess.Popen(
         [str(viewer.binary()), *bind],
-        env=viewer.quiet(),
+        env=viewer.quiet_environment(),
         stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL,
     )

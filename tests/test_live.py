@@ -85,7 +85,7 @@ def test_what_is_sent_is_what_was_simulated(name: str, kept: Path) -> None:
 )
 def test_address_elsewhere_or_none_is_refused(address: str, said: str) -> None:
     with pytest.raises(ConfigError) as caught:
-        live.checked(address)
+        live.check_address(address)
     assert str(caught.value).startswith(said)
 
 
@@ -133,7 +133,7 @@ def test_who_speaks_no_grpc_is_no_viewer(answer: bytes, monkeypatch: pytest.Monk
         thread = threading.Thread(target=serve)
         thread.start()
         with pytest.raises(ConfigError, match=r"^no Rerun viewer listens at 127\.0\.0\.1:\d+: "):
-            live.checked(f"127.0.0.1:{server.getsockname()[1]}")
+            live.check_address(f"127.0.0.1:{server.getsockname()[1]}")
         judged.set()
         thread.join()
 
@@ -142,7 +142,7 @@ def wait_for(viewer: subprocess.Popen[bytes], address: str) -> None:
     """Wait until a viewer listens, however long it takes to start."""
     while True:
         try:
-            live.checked(address)
+            live.check_address(address)
             return
         except ConfigError:
             assert viewer.poll() is None
@@ -156,7 +156,7 @@ def test_viewer_that_is_closed_does_not_harm_the_run(tmp_path: Path) -> None:
     command = [str(recording_viewer.binary()), "--serve-grpc", "--bind", "127.0.0.1", "--port"]
     viewer = subprocess.Popen(
         [*command, address.split(":")[1]],
-        env=recording_viewer.quiet(),
+        env=recording_viewer.quiet_environment(),
         stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL,
     )

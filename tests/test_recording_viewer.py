@@ -12,7 +12,7 @@ from fivebar_sim.recording import viewer
 
 
 def test_viewer_is_the_binary_and_binds_the_loopback(tmp_path: Path) -> None:
-    command = viewer.native(tmp_path / "a.rrd")
+    command = viewer.native_command(tmp_path / "a.rrd")
     assert command[-1] == str((tmp_path / "a.rrd").resolve())
     assert command[command.index("--bind") + 1] == "127.0.0.1"
     shown = subprocess.run([command[0], "--help"], capture_output=True, text=True, check=True)
@@ -23,7 +23,7 @@ def test_viewer_is_the_binary_and_binds_the_loopback(tmp_path: Path) -> None:
 def test_missing_viewer_is_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
     with pytest.raises(viewer.ViewerMissingError, match="rerun_cli") as caught:
-        viewer.native(Path("a.rrd"))
+        viewer.native_command(Path("a.rrd"))
     assert isinstance(caught.value, FiveBarError)
     assert isinstance(caught.value, FileNotFoundError)
 
@@ -50,7 +50,7 @@ def test_web_files_are_taken_over_the_loopback_and_the_source_ends(
     ("script", "said"),
     [
         ("echo no web viewer in here", "no web viewer in here"),
-        ("true", "it ended without a word"),
+        ("true", "it ended without a message"),
         ("echo web-viewer at http://127.0.0.1:1", "refused"),
     ],
 )

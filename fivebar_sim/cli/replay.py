@@ -39,10 +39,10 @@ def _show(run_dirs: tuple[Path, ...]) -> int:
     from fivebar_sim.runs import recording_file
 
     with recording_file.opened(run_dirs) as file:
-        command = viewer.native(file)
+        command = viewer.native_command(file)
         shown = f"`fivebar replay {' '.join(map(str, run_dirs))} --web` shows it in a browser"
         screen.check(shown)
-        return subprocess.run(command, env=viewer.quiet()).returncode
+        return subprocess.run(command, env=viewer.quiet_environment()).returncode
 
 
 def _serve(run_dirs: tuple[Path, ...], port: int) -> int:

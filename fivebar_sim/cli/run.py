@@ -57,9 +57,9 @@ def _viewer(address: str | None) -> str:
     from fivebar_sim.render.screen import check
 
     if address is not None:
-        return live.checked(address)
+        return live.check_address(address)
     check("--live-at shows the run in a viewer that listens already")
-    return live.spawned()
+    return live.spawn_viewer()
 
 
 def _execute(planned: Plan, viewer: str | None) -> Result:

@@ -1,1 +1,1 @@
-"""Recordings for Rerun: written, shown while a run goes on, served to a browser."""
+"""Recordings for Rerun: written to files, shown live during a run, served to a browser."""

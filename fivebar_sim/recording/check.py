@@ -1,7 +1,7 @@
-"""Whether Rerun reads a recording, to its end: a program of its own, since some damage ends it.
+"""Check that Rerun can read a whole recording, as a separate program: some damage crashes it.
 
-Usage: python -m fivebar_sim.recording.check RECORDING. Exit status 0 if it can be read; what Rerun
-and its reader say of the damage is of no use to anybody, and goes where the caller sends it.
+Usage: python -m fivebar_sim.recording.check RECORDING. Exit status 0 if it can be read. Rerun's own
+messages about the damage help nobody; they go where the caller sends them.
 """
 
 from __future__ import annotations
@@ -15,37 +15,41 @@ from pathlib import Path
 
 
 def reads(path: Path) -> bool:
-    """Return whether the installed Rerun reads a file, asked of another process.
+    """Return whether the installed Rerun reads a file, tried in another process.
 
-    In this one a panic of the reader would be the end of everything.
+    In this process a panic of the reader would end the whole program.
     """
+    # -P: a rerun.py in the user's folder must not be imported for Rerun.
     command = [sys.executable, "-P", "-m", "fivebar_sim.recording.check", str(path)]
     nowhere = subprocess.DEVNULL
     return subprocess.call(command, stdin=nowhere, stdout=nowhere, stderr=nowhere) == 0
 
 
 def read_through(path: Path) -> None:
-    """Read a recording, in this process.
-
-    The store opens only with a whole footer, and the stream meets every other damage.
+    """Read a recording in this process.
 
     Raises:
-        Exception: Any, where Rerun cannot read it.
+        Exception: Of any kind, if Rerun cannot read it.
     """
     from rerun.chunk import RrdReader
 
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # that there is no footer
+        # A recording that was cut off has no footer, and the reader warns of that.
+        warnings.simplefilter("ignore")
         reader = RrdReader(path)
+        # The store opens only with a whole footer; the stream finds every other damage.
         reader.store()
         for chunk in reader.stream():
             del chunk
 
 
 if __name__ == "__main__":
-    with suppress(ImportError):  # Windows has none
+    # Windows has no module resource.
+    with suppress(ImportError):
         import resource
 
-        resource.setrlimit(resource.RLIMIT_CORE, (0, 0))  # a panic leaves no core file
-    os.environ["CI"] = "true"  # no analytics
+        # A panic of the reader is expected here: it should not leave a core file.
+        resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    # Rerun sends no analytics in CI.
+    os.environ["CI"] = "true"
     read_through(Path(sys.argv[1]))

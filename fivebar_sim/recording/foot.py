@@ -23,17 +23,17 @@ TARGET_PATH = f"{HIP}/target_path"
 TRAIL_SECONDS = 0.6
 """How long the trail of the foot stays [s]."""
 BACKGROUND: Colour = (24, 26, 30)
-"""What the trail fades into."""
+"""The colour into which the trail fades."""
 
 
 class Band(NamedTuple):
     """A part of the trail, by its age.
 
     Attributes:
-        entity: Under the run's root.
+        entity: Path of the entity under the run's root.
         oldest: Age of its far end [s].
         newest: Age of its near end [s].
-        fresh: 1 beside the foot, towards 0 where the trail ends.
+        fresh: 1 beside the foot, falling to 0 where the trail ends.
     """
 
     entity: str
@@ -50,9 +50,10 @@ TRAIL = tuple(
 
 
 def log_foot(stream: rr.RecordingStream, target: Array, look: Look) -> None:
-    """Log the whole target path (n, 2) [m] as one line, and how target and trail look."""
+    """Log the whole target path (n, 2) [m] as one line, and the style of target and trail."""
     import rerun as rr
 
+    # Styles are logged once, static; `send_foot` sends the positions alone.
     green = look.colour(GREEN)
     path = rr.LineStrips3D([in_space(target)], radii=rr.Radius.ui_points(1.5), colors=[green])
     stream.log(f"{look.root}{TARGET_PATH}", path, static=True)
@@ -62,12 +63,12 @@ def log_foot(stream: rr.RecordingStream, target: Array, look: Look) -> None:
     for band in TRAIL:
         line = rr.LineStrips3D.from_fields(
             radii=rr.Radius.ui_points(0.5 + 2.0 * band.fresh),
-            colors=[faded(look.colour(RED), band.fresh)],
+            colors=[fade(look.colour(RED), band.fresh)],
         )
         stream.log(f"{look.root}{band.entity}", line, static=True)
 
 
-def faded(colour: Colour, fresh: float) -> Colour:
+def fade(colour: Colour, fresh: float) -> Colour:
     """Return a colour between the background (fresh = 0) and itself (fresh = 1)."""
     red, green, blue = (
         round(fresh * own + (1.0 - fresh) * behind)
@@ -81,11 +82,11 @@ def send_foot(
 ) -> None:
     """Send the target and the trail, as columns.
 
-    The target is a needle across the leg plane, to be seen on both sides of the foot; a row of
-    the trail is the way from the row before.
+    A row of the trail is the line from the row before to this one.
     """
     import rerun as rr
 
+    # A needle across the leg plane, so that the target shows on both sides of the foot's ball.
     tip = np.array([0.0, 2.5 * leg.foot_radius, 0.0])
     target = in_space(moved.target)
     foot = in_space(moved.world_foot)
@@ -93,5 +94,6 @@ def send_foot(
     steps = np.stack([np.concatenate([foot[:1], foot[:-1]]), foot], axis=1)
     strips |= {band.entity: steps for band in TRAIL}
     for entity, lines in strips.items():
+        # Rerun stores positions in single precision.
         columns = rr.LineStrips3D.columns(strips=lines.astype(np.float32))
         stream.send_columns(f"{look.root}{entity}", times, columns)

@@ -21,7 +21,7 @@ MARGIN = 0.4
 WIDTH = 0.6
 """How far the floor reaches beyond the leg, and how wide it is, in sizes of the leg."""
 STRIPES = 8
-"""Stripes across a belt."""
+"""Number of stripes across a belt."""
 
 
 def log_floor(stream: rr.RecordingStream, stage: Stage) -> None:
@@ -30,6 +30,7 @@ def log_floor(stream: rr.RecordingStream, stage: Stage) -> None:
 
     half = 0.5 * _length(stage)
     y = 0.5 * WIDTH * stage.size
+    # The box's top is the floor, so its centre lies half its height below.
     thick = 0.01 * stage.size
     floor = rr.Boxes3D(
         centers=[[_start(stage) + half, 0.0, -thick]],
@@ -56,10 +57,9 @@ def send_ground(
     times: list[rr.TimeColumn],
     stage: Stage,
 ) -> None:
-    """Send the ground's force on the foot and the belt, as columns, where there are any.
+    """Send the ground's force on the foot, and the belt, as columns, if there are any.
 
-    The force is an arrow from the contact, none while the foot is in the air. The stripes run with
-    the belt, and go back to where they began when it has gone one gap between them.
+    The force is an arrow from the contact, hidden while the foot is in the air.
     """
     import rerun as rr
 
@@ -72,6 +72,7 @@ def send_ground(
             origins=in_space(contact[down]),
             vectors=in_space(stage.metre_per_newton * moved.force[down]),
         )
+        # Rows in the air get an empty batch: without one the last arrow would stay in sight.
         stream.send_columns(f"{look.root}{FORCE}", times, arrows.partition(down.astype(np.intp)))
 
     if moved.belt is not None:
@@ -83,6 +84,7 @@ def send_ground(
             stripes, radii=[0.004 * stage.size], colors=[look.colour(LIGHT_GREY)]
         )
         stream.log(f"{look.root}{BELT}", lines, static=True)
+        # The stripes jump back by one gap as they reach the next: it looks like an endless belt.
         shift = in_space(np.stack([np.mod(moved.belt, gap), np.zeros_like(moved.belt)], axis=-1))
         columns = rr.Transform3D.columns(translation=shift)
         stream.send_columns(f"{look.root}{BELT}", times, columns)

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 SUMMARY = "summary"
 LEGEND = 8
-"""The most lines that a legend has: a longer one hides its plot."""
+"""Largest number of lines for which a plot has a legend: a longer one hides the plot."""
 
 
 def contents(
@@ -30,12 +30,13 @@ def contents(
     """Return the views of all runs.
 
     Args:
-        stage: The room that the legs need.
-        looks: Of each run.
-        plots: Of each run.
+        stage: The space that the legs need.
+        looks: The look of each run.
+        plots: The plots of each run.
     """
     import rerun.blueprint as rrb
 
+    # Runs share their plots, and a plot that one run alone has is shown too.
     first: dict[str, Series] = {}
     for each in (line for lines in plots for line in lines):
         first.setdefault(each.plot, each)
@@ -51,6 +52,7 @@ def leg_view(stage: Stage, looks: Sequence[Look]) -> rrb.Spatial3DView:
 
     centre = in_space(0.5 * (stage.low + stage.high))
     distance = 1.4 * float(np.max(stage.high - stage.low)) + 0.1 * stage.size
+    # Each band of the trail shows its own stretch of time before the cursor.
     trails: dict[EntityPathLike, VisualizerLike | Iterable[VisualizerLike]] = {
         f"/{look.root}{band.entity}": rrb.VisibleTimeRanges(
             timeline="sim_time",
@@ -74,12 +76,13 @@ def leg_view(stage: Stage, looks: Sequence[Look]) -> rrb.Spatial3DView:
 
 
 def _ago(age: float) -> int:
-    """Return how long before the cursor an age [s] is [ns]; from seconds Rerun would truncate."""
+    """Return an age [s] as a time relative to the cursor [ns]."""
+    # Rerun would truncate seconds to nanoseconds, where this rounds.
     return -round(1e9 * age)
 
 
 def plot_view(plot: Series, looks: Sequence[Look]) -> rrb.TimeSeriesView:
-    """Return the view of one plot, with the lines of all runs, and a legend where it helps."""
+    """Return the view of one plot with the lines of all runs, and a legend if it helps."""
     import rerun.blueprint as rrb
 
     count = len(looks) * len(plot.lines)
@@ -95,13 +98,11 @@ def plot_view(plot: Series, looks: Sequence[Look]) -> rrb.TimeSeriesView:
 
 
 def send(stream: rr.RecordingStream, views: rrb.Container) -> None:
-    """Send the layout.
-
-    Rerun logs it to a stream of its own, which would live (with threads and megabytes) until the
-    process ends: it belongs to a sink that belongs to it. Disconnecting parts the two.
-    """
+    """Send the layout."""
     import rerun.blueprint as rrb
 
+    # Rerun logs a blueprint to a stream of its own, which lives, with threads and megabytes, until
+    # the process ends: stream and sink refer to each other. So it is caught, and disconnected.
     streams: list[rr.RecordingStream] = []
 
     class Layout(rrb.Blueprint):
@@ -118,5 +119,6 @@ def send(stream: rr.RecordingStream, views: rrb.Container) -> None:
         auto_views=False,
     )
     stream.send_blueprint(layout)
-    while streams:  # emptied, since a class lives until the next garbage collection
+    # Emptied, since the class Layout refers to the list until the next garbage collection.
+    while streams:
         streams.pop().disconnect()

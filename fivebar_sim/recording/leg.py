@@ -71,11 +71,12 @@ def link_frames(leg: FiveBar, q: Array) -> dict[str, tuple[Array, Array]]:
 
 
 def log_leg(stream: rr.RecordingStream, leg: FiveBar, look: Look) -> None:
-    """Log what does not change: the links, each in its own frame, the base and the motors."""
+    """Log the parts that do not change: each link in its own frame, the base and the motors."""
     import rerun as rr
 
     hip = f"{look.root}{HIP}"
     r = leg.radius
+    # Shapes are static: a row of the recording moves their frames alone.
     for name, side in (("L1", -1), ("L2", -1), ("L3", 1), ("L4", 1)):
         bars = [(0.0, getattr(leg, name), 0.0)]
         if name == "L2" and leg.L6 > 0.0:
@@ -84,6 +85,7 @@ def log_leg(stream: rr.RecordingStream, leg: FiveBar, look: Look) -> None:
             f"{hip}/{name}", _bars(bars, side * r, r, look.colour(COLOURS[name])), static=True
         )
 
+    # Each pin sticks out of the links that it joins; C goes through both chains.
     for joint, link, length, y, width in (
         ("B", "L1", leg.L1, -r, 2.8 * r),
         ("C", "L2", leg.L2, 0.0, 4.8 * r),
@@ -127,15 +129,16 @@ def _log_base(stream: rr.RecordingStream, leg: FiveBar, look: Look) -> None:
 def _bars(
     bars: list[tuple[float, float, float]], y: float, radius: float, colour: Colour
 ) -> rr.Capsules3D:
-    """Return capsules of a link's frame, each (start along x [m], length [m], direction [rad])."""
+    """Return capsules in a link's frame, each (start along x [m], length [m], direction [rad])."""
     import rerun as rr
 
     start, length, angle = np.array(bars).T
+    # Rerun's capsules lie along z, a link along x: hence the quarter turn back.
     return rr.Capsules3D(
         lengths=length,
         radii=[radius],
         translations=np.stack([start, np.full_like(start, y), np.zeros_like(start)], axis=-1),
-        quaternions=turn(angle - 0.5 * math.pi),  # Rerun's capsules lie along z
+        quaternions=turn(angle - 0.5 * math.pi),
         colors=[colour],
         fill_mode="solid",
     )
@@ -149,9 +152,10 @@ def _axle(
     colour: Colour,
     look: Look,
 ) -> rr.Cylinders3D:
-    """Return a cylinder along y, about its centre; a leg that is alone has its joints labelled."""
+    """Return a cylinder along y, about its centre."""
     import rerun as rr
 
+    # Beside other legs a leg has one label, its run's at the foot.
     return rr.Cylinders3D(
         lengths=[width],
         radii=[radius],

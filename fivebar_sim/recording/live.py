@@ -1,4 +1,4 @@
-"""A run shown in Rerun while it is simulated: poses and plots, sent beside the physics."""
+"""Show a run in Rerun while it is simulated: poses and plots, sent from a second thread."""
 
 from __future__ import annotations
 
@@ -32,26 +32,26 @@ if TYPE_CHECKING:
 
 
 RATE = 60.0
-"""Poses for a second of the run [Hz]."""
+"""Poses per second of the run [Hz]."""
 LOOPBACK = ("127.0.0.1", "localhost", "::1")
 SWITCH = 5e-4
 """How long the sending thread may keep the physics' thread waiting for the interpreter [s]."""
 SETTINGS = bytes([0, 0, 0, 4, 0, 0, 0, 0, 0])
-"""An empty SETTINGS frame of HTTP/2: how either side of gRPC begins (RFC 9113)."""
+"""An empty SETTINGS frame of HTTP/2, with which either side of gRPC begins (RFC 9113)."""
 HELLO = b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n" + SETTINGS
 ANSWER = 2.0
-"""How long a viewer may take to answer that [s]."""
+"""How long a viewer may take to answer HELLO [s]."""
 PATIENCE = 20.0
-"""How long a viewer may take to listen, and the last rows to be sent [s]."""
+"""How long a new viewer may take to listen, and how long sending the last rows may take [s]."""
 
 
 @contextmanager
 def streaming(planned: Plan, address: str) -> Iterator[Watch]:
-    """Give what `rollout.execute` shall be watched by, to show a run in a listening viewer.
+    """Yield a watcher for `rollout.execute` that shows the run in a listening viewer.
 
     Args:
-        planned: What will be simulated.
-        address: HOST:PORT of the viewer, as `spawned` returns it; see `checked`.
+        planned: The plan that will be simulated.
+        address: HOST:PORT of the viewer, as `spawn_viewer` returns it; see `check_address`.
 
     Raises:
         RerunDisabledError: The environment variable RERUN switches Rerun off.
@@ -60,6 +60,7 @@ def streaming(planned: Plan, address: str) -> Iterator[Watch]:
         stream = rrd.started(planned.scenario.name)
         stream.connect_grpc(f"rerun+http://{address}/proxy")
         sender = _Sender(planned, stream)
+        # Python's own interval is ten times as long: so long the sender would hold up the physics.
         before = sys.getswitchinterval()
         sys.setswitchinterval(SWITCH)
         try:
@@ -70,11 +71,11 @@ def streaming(planned: Plan, address: str) -> Iterator[Watch]:
             _end(stream)
 
 
-def checked(address: str) -> str:
-    """Return the address of a viewer, if one listens there, on this machine.
+def check_address(address: str) -> str:
+    """Return the address of a viewer unchanged, if one listens there, on this machine.
 
     Raises:
-        ConfigError: No HOST:PORT, a host that is not this one, or nobody listens.
+        ConfigError: Not HOST:PORT, a host that is not this machine, or no viewer listens.
     """
     host, colon, port = address.rpartition(":")
     if not colon or not re.fullmatch(r"\d{1,5}", port, re.ASCII) or not 0 < int(port) < 2**16:
@@ -84,30 +85,34 @@ def checked(address: str) -> str:
 
     try:
         with socket.create_connection((host.strip("[]"), int(port)), timeout=ANSWER) as viewer:
+            # A port that is open need not be a viewer's: it must answer as gRPC does.
             viewer.sendall(HELLO)
+            # The fourth byte of a frame is its type.
             if viewer.recv(5)[3:4] != SETTINGS[3:4]:
-                raise OSError("what answers there speaks no gRPC")
+                raise OSError("what answers there does not speak gRPC")
     except OSError as error:
-        said = error.strerror or error
-        raise ConfigError(f"no Rerun viewer listens at {address}: {said}") from None
+        reason = error.strerror or error
+        raise ConfigError(f"no Rerun viewer listens at {address}: {reason}") from None
     return address
 
 
 def _end(stream: rr.RecordingStream) -> None:
-    """Send what is left and let go; not for ever, as a viewer that has gone does not answer."""
+    """Send what is left and disconnect, within `PATIENCE`: a viewer that is gone never answers."""
 
     def end() -> None:
-        with suppress(RuntimeError):  # the viewer was closed: the run itself has come to no harm
+        # A viewer that the user has closed does no harm to the run.
+        with suppress(RuntimeError):
             stream.flush(timeout_sec=PATIENCE)
             stream.disconnect()
 
+    # A daemon: if the call hangs all the same, it does not keep the program alive.
     ending = threading.Thread(target=end, daemon=True)
     ending.start()
     ending.join(PATIENCE)
 
 
-def spawned() -> str:
-    """Return the address of a new viewer, which stays when this program ends.
+def spawn_viewer() -> str:
+    """Start a viewer that outlives this program, and return its address.
 
     Raises:
         ViewerMissingError: The installation lacks the viewer's binary.
@@ -118,17 +123,19 @@ def spawned() -> str:
         port = free.getsockname()[1]
 
     command = [str(recording_viewer.binary()), "--bind", recording_viewer.LOOPBACK]
+    # It prints every graphics device that it tries. In a session of its own, since Ctrl-C in the
+    # terminal should end the run and not the viewer.
     viewer = subprocess.Popen(
         [*command, "--port", str(port)],
-        env=recording_viewer.quiet(),
-        stdout=subprocess.DEVNULL,  # it tells of every device that it tries
+        env=recording_viewer.quiet_environment(),
+        stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL,
         start_new_session=True,
     )
     deadline = time.monotonic() + PATIENCE
     while viewer.poll() is None and time.monotonic() < deadline:
         try:
-            return checked(f"{recording_viewer.LOOPBACK}:{port}")
+            return check_address(f"{recording_viewer.LOOPBACK}:{port}")
         except ConfigError:
             time.sleep(0.1)
 
@@ -136,7 +143,7 @@ def spawned() -> str:
 
 
 class _Sender:
-    """Sends states from a thread of its own, so that the physics need not wait."""
+    """Sends states from its own thread, so that the physics does not wait."""
 
     def __init__(self, planned: Plan, stream: rr.RecordingStream) -> None:
         self._planned = planned
@@ -150,11 +157,11 @@ class _Sender:
         self._thread.start()
 
     def put(self, states: States) -> None:
-        """Take states to be sent."""
+        """Queue states for sending."""
         self._queue.put(states)
 
     def finish(self) -> None:
-        """Wait until everything is sent; raise what went wrong."""
+        """Wait until everything is sent; raise the error of the sending thread, if any."""
         self._queue.put(None)
         self._thread.join()
         if self._error is not None:
@@ -165,15 +172,18 @@ class _Sender:
             if self._error is None:
                 try:
                     self._send(states)
-                except Exception as error:  # for the thread that waits
+                except Exception as error:
+                    # Kept for `finish`: raised here, nobody would see it.
                     self._error = error
 
     def _send(self, states: States) -> None:
-        """Send some steps; those before give the first of them its torque."""
+        """Send some steps."""
+        # The torque of a step needs the state before it: the last one of the part before.
         known = 0 if self._last is None else 1
         joined = states if self._last is None else States.joined([self._last, states])
         record = columns(self._planned, joined, self._begin - known)
         record = {name: column[known:] for name, column in record.items()}
+        # A single row does not tell the timestep, which the plots need.
         if len(record["time"]) > 1:
             self._show(record)
         self._begin += states.time.shape[1]
@@ -199,6 +209,7 @@ class _Sender:
 
         for plot in plots:
             shown = plot.shown[rows]
+            # `values` has rows only where `shown` is true: the running count is their index.
             values = plot.values[(np.cumsum(plot.shown) - 1)[rows[shown]]]
             rrd.send_series(stream, plot._replace(values=values, shown=shown), look, at)
 
@@ -220,9 +231,10 @@ def _markdown(text: str) -> rr.TextDocument:
 
 
 def _room(planned: Plan) -> Stage:
-    """Return the room that the planned motion needs; how large forces will be is not known yet."""
+    """Return the space that the planned motion needs."""
     leg = planned.scenario.leg
     record = planned.motion
+    # Some 500 poses show where the leg goes, however long the run is.
     every = slice(None, None, max(1, len(record.q) // 500))
     ground_scene = planned.scenario.scene
     hip = None
@@ -234,5 +246,6 @@ def _room(planned: Plan) -> Stage:
     if not isinstance(ground_scene, Ground):
         return room
 
+    # The forces are not known yet: the weight gets an arrow of a tenth of the leg's size.
     weight = 9.81 * (ground_scene.mass + sum(link.mass for link in leg.links))
     return room._replace(metre_per_newton=0.1 * leg.size / weight)

@@ -1,4 +1,4 @@
-"""Colours of a recording, and how several runs in one recording are told apart."""
+"""Colours of a recording, and how to tell apart several runs in one recording."""
 
 from __future__ import annotations
 
@@ -27,17 +27,17 @@ TINTS: tuple[Colour, ...] = (
     (60, 200, 200),
     (225, 70, 70),
 )
-"""The colours of runs that are shown together; the seventh is that of the first again."""
+"""The colours of runs that are shown together; the seventh run has the first colour again."""
 TINTED = 0.7
-"""How much of a run's colour is its own where several are shown; the rest is the part's."""
+"""Fraction of a run's own colour where several runs are shown; the rest is the part's colour."""
 
 
 class Look(NamedTuple):
-    """How one run looks beside others; one that is shown alone has no need of a look.
+    """How one run looks beside others; a run that is shown alone has the default look.
 
     Attributes:
-        root: What its entities begin with, "" or "run_1/".
-        label: What it is called, or "".
+        root: Prefix of its entities, "" or "run_1/".
+        label: Its name, or "".
         tint: Its colour, or None where every part has its own.
     """
 
@@ -56,12 +56,12 @@ class Look(NamedTuple):
         return red, green, blue
 
     def line(self, name: str) -> str:
-        """Return what a line of a plot is called in this run."""
+        """Return the name of a plot's line in this run."""
         return f"{self.label}: {name}" if self.label else name
 
 
 def looks(labels: list[str]) -> list[Look]:
-    """Return the looks of runs that are shown together, by what each is called."""
+    """Return the looks of runs that are shown together, from their names."""
     if len(labels) == 1:
         return [Look()]
     return [Look(f"run_{i + 1}/", label, TINTS[i % len(TINTS)]) for i, label in enumerate(labels)]

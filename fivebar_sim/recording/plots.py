@@ -1,4 +1,4 @@
-"""The plots of a recording: what a record says as lines over time, in units that people read."""
+"""The plots of a recording: a record as lines over time, in units that people read."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 SHARE_WINDOW = 0.05
 """Width of the window over which the load share is taken [s]."""
 SHARE_FLOOR = 1e-6
-"""Mean |torque| in the window that at least one motor must reach for a share to be drawn [N m]."""
+"""Mean |torque| that one motor at least must reach in the window for a share to be drawn [N m]."""
 
 
 class Series(NamedTuple):
@@ -37,10 +37,10 @@ class Series(NamedTuple):
 
     Attributes:
         path: Entity; its first part is the plot, so that "torque/limit" is drawn with "torque".
-        title: What is plotted, with its unit.
+        title: Title with its unit.
         lines: Name and colour of each line.
-        values: In the title's unit, (n, len(lines)).
-        shown: Whether a row of the record has values, (N,); n is the count of those that have.
+        values: Values in the title's unit, (n, len(lines)).
+        shown: Whether a row of the record has values, (N,); n of them have.
         bounds: The plot's fixed range, or None to fit the values.
     """
 
@@ -53,7 +53,7 @@ class Series(NamedTuple):
 
     @property
     def plot(self) -> str:
-        """The plot that it is drawn in."""
+        """The plot in which it is drawn."""
         return self.path.split("/")[0]
 
 
@@ -65,7 +65,7 @@ COMMANDS = {"ctrl_A": RED, "ctrl_E": GREEN}
 def series(scenario: Scenario, record: Record) -> Iterator[Series]:
     """Yield the plots of a run, in the order in which they are shown.
 
-    Commands are drawn with what they are: angles with the joints, torques with the motors.
+    Commands are drawn with their own kind: angles with the joints, torques with the motors.
     """
     every = np.ones(len(record["time"]), dtype=bool)
     error = tracking_error(record)
@@ -112,7 +112,7 @@ def _columns(record: Record, *names: str) -> Array:
 
 
 def load_share(torque: Array, half: int) -> tuple[Array, Bools]:
-    """Return A's part of the absolute torque impulse in a moving window, where there is load.
+    """Return A's share of the absolute torque impulse in a moving window, where there is load.
 
         share_A = sum |tau_A| / (sum |tau_A| + sum |tau_E|),   over rows k - half ... k + half
 
@@ -123,12 +123,13 @@ def load_share(torque: Array, half: int) -> tuple[Array, Bools]:
         half: Rows on each side of the window's centre.
 
     Returns:
-        share_A in [0, 1] of the rows under load, (n,), and which rows those are, (N,): those in
-        whose window the mean |tau| of one motor at least reaches `SHARE_FLOOR`.
+        share_A in [0, 1] of the rows under load, (n,), and which rows those are, (N,). Under load,
+        the mean |tau| of at least one motor reaches `SHARE_FLOOR` in the row's window.
     """
     k = np.arange(len(torque))
     low = np.maximum(k - half, 0)
     high = np.minimum(k + half + 1, len(torque))
+    # Differences of a running sum: a wide window costs no more than a narrow one.
     total = np.concatenate([np.zeros((1, 2)), np.cumsum(np.abs(torque), axis=0)])
     impulse = total[high] - total[low]
     loaded = impulse.max(axis=1) >= SHARE_FLOOR * (high - low)

@@ -1,4 +1,4 @@
-"""Where everything of a run is in the rows of its record that are drawn."""
+"""The poses of a run in those rows of its record that are drawn."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ class Motion(NamedTuple):
         q: (theta_A, theta_B, theta_E, theta_D), (n, 4).
         foot: F in the hip frame, (n, 2).
         target: Where F should be, hip frame, (n, 2).
-        hip: The hip above the floor, (n,); None where there is no floor.
-        force: Of the ground on the foot, (n, 2); None where there is no ground.
+        hip: Height of the hip above the floor, (n,); None without a floor.
+        force: Force of the ground on the foot, (n, 2); None without a ground.
         belt: How far the belt has run, (n,); None where the floor stands still.
     """
 
@@ -39,7 +39,7 @@ class Motion(NamedTuple):
 
     @property
     def world_foot(self) -> Array:
-        """F above the floor, (n, 2); without a floor that in the hip frame."""
+        """F in the frame of the floor, (n, 2); without a floor in the hip frame."""
         return self.foot if self.hip is None else self.foot + in_height(self.hip)
 
 
@@ -56,13 +56,15 @@ def motion(record: Mapping[str, Array], rows: Rows) -> Motion:
 
 
 def timestep(time: Array) -> float:
-    """Return h [s] of times that are h apart; of one alone it is that time."""
+    """Return the spacing h [s] of equidistant times; of a single time that time itself."""
+    # Record times start at h, so one row alone has time h.
     return float(time[-1] - time[0]) / (len(time) - 1) if len(time) > 1 else float(time[0])
 
 
 def drawn_rows(time: Array) -> Rows:
     """Return the rows whose poses are drawn: the first, one every `POSE_PERIOD`, and the last."""
     every = max(1, round(POSE_PERIOD / timestep(time)))
+    # The last row too, so that a replay stops where the run ended.
     return np.union1d(np.arange(0, len(time), every), len(time) - 1)
 
 
@@ -78,14 +80,14 @@ def in_height(z: ArrayLike) -> Array:
 
 
 class Stage(NamedTuple):
-    """The room that all runs of a recording need together; the floor is the plane z = 0.
+    """The space that all runs of a recording need together; the floor is the plane z = 0.
 
     Attributes:
-        low: The lowest (x, z) [m] that a leg comes to, and the floor's height where there is one.
+        low: The lowest (x, z) that any leg reaches, or the floor's height if it is lower [m].
         high: The highest (x, z) [m].
-        size: Of the largest leg [m].
-        metre_per_newton: Length of a force's arrow: that of the largest is half of size.
-        floor: Whether there is one.
+        size: Size of the largest leg [m].
+        metre_per_newton: Length of a force's arrow per newton: the largest is half of size long.
+        floor: Whether there is a floor.
     """
 
     low: Array
@@ -96,7 +98,7 @@ class Stage(NamedTuple):
 
 
 def stage(legs: Sequence[FiveBar], moved: Sequence[Motion]) -> Stage:
-    """Return the room that legs and their motions need."""
+    """Return the space that legs and their motions need."""
     places = np.concatenate([_places(leg, each) for leg, each in zip(legs, moved, strict=True)])
     forces = [np.hypot(*each.force.T).max() for each in moved if each.force is not None]
     floor = any(each.hip is not None for each in moved)
@@ -104,11 +106,12 @@ def stage(legs: Sequence[FiveBar], moved: Sequence[Motion]) -> Stage:
         places = np.concatenate([places, np.zeros((1, 2))])
     size = max(leg.size for leg in legs)
     largest = float(max(forces, default=0.0))
+    # Without any force there is no arrow to scale.
     scale = 0.5 * size / largest if largest > 0.0 else 0.0
     return Stage(places.min(axis=0), places.max(axis=0), size, scale, floor)
 
 
 def _places(leg: FiveBar, moved: Motion) -> Array:
-    """Return everywhere that the joints of a leg come to [m], (..., 2)."""
+    """Return all positions of a leg's joints [m], (..., 2)."""
     hip = in_height(np.zeros(len(moved.q)) if moved.hip is None else moved.hip)
     return np.concatenate([hip + p for p in (*bases(leg), *chain_points(leg, moved.q))])

@@ -40,11 +40,11 @@ class RerunDisabledError(FiveBarError, RuntimeError):
 
 
 class Run(Protocol):
-    """What is drawn of a run: a result, or one that was read back."""
+    """The parts of a run that are drawn: of a result, or of one that was read back."""
 
     @property
     def scenario(self) -> Scenario:
-        """What was run."""
+        """The scenario that was run."""
         ...
 
     @property
@@ -54,22 +54,22 @@ class Run(Protocol):
 
     @property
     def metrics(self) -> Mapping[str, Any]:
-        """What metrics.json says."""
+        """The contents of metrics.json."""
         ...
 
 
 def write(path: Path, runs: Sequence[Run], labels: Sequence[str] = ()) -> None:
-    """Write the recording of runs to a .rrd file, in one go; several lie over each other.
+    """Write the recording of one or more runs to a .rrd file; several are drawn over each other.
 
     Timelines: `sim_time` (the record's time, to the nanosecond) and `step` (from 1: t = step h).
     Series have every row of the record, poses one row every `POSE_PERIOD` and the last one. The
-    bytes are complete before the file is opened, so what fails on the disk is a plain OSError.
+    bytes are complete before the file is opened, so a failing disk raises a plain OSError.
 
     Args:
         path: The file; an existing one is overwritten.
-        runs: What is drawn, at least one. Of several each has its own colour, and its entities
+        runs: The runs to draw, at least one. Of several each has its own colour, and its entities
             are under run_1, run_2, ...
-        labels: What each is called, all different; left out, what their scenarios are called.
+        labels: Names of the runs, all different; by default the names of their scenarios.
 
     Raises:
         OSError: The file cannot be written.
@@ -77,21 +77,18 @@ def write(path: Path, runs: Sequence[Run], labels: Sequence[str] = ()) -> None:
     """
     names = list(labels) or [run.scenario.name for run in runs]
     with session():
-        data = _encoded(runs, names)
+        data = _encode(runs, names)
     path.write_bytes(data)
 
 
 @contextmanager
 def session() -> Iterator[None]:
-    """Let mistakes in the use of Rerun raise (they are warnings otherwise), and tidy up after it.
-
-    Rerun's strictness is global, so one recording is made at a time. A recording that nothing
-    refers to any more still keeps its threads and megabytes until it is cleaned up explicitly.
-    """
+    """Make wrong use of Rerun raise, where it would only warn, and clean up after it."""
     _load()
     import rerun as rr
     import rerun_bindings
 
+    # Rerun's strictness is global, so one recording is made at a time.
     with LOCK:
         before = rr.strict_mode()
         rr.set_strict_mode(True)
@@ -99,15 +96,15 @@ def session() -> Iterator[None]:
             yield
         finally:
             rr.set_strict_mode(before)
-            with suppress(RuntimeError):  # of a live one whose viewer has gone
+            # A recording that nothing refers to keeps its threads and megabytes until this call,
+            # which fails for a live one whose viewer is gone.
+            with suppress(RuntimeError):
                 rerun_bindings.flush_and_cleanup_orphaned_recordings()
 
 
 def _load() -> None:
-    """Import Rerun so that it does not warn of a recording that a signal ended half made.
-
-    Its log reads the environment once, when it is imported; a RUST_LOG of the user's stays.
-    """
+    """Import Rerun so that it does not warn when a signal ends a half-made recording."""
+    # Its log reads the environment once, at import; a RUST_LOG that the user has set stays.
     ours = "RUST_LOG" not in os.environ
     os.environ.setdefault("RUST_LOG", "warn,re_sdk=error")
     try:
@@ -117,20 +114,21 @@ def _load() -> None:
             del os.environ["RUST_LOG"]
 
 
-def _encoded(runs: Sequence[Run], names: list[str]) -> bytes:
+def _encode(runs: Sequence[Run], names: list[str]) -> bytes:
     """Return the bytes of the recording."""
     stream = started(" + ".join(names))
     output = stream.binary_stream()
     try:
         _send(stream, runs, names)
     finally:
-        data = output.read()  # also where a signal ends it: Rerun warns of bytes that nobody reads
+        # Read also when a signal breaks in: Rerun warns of bytes that nobody has read.
+        data = output.read()
     assert data is not None
     return data
 
 
 def _send(stream: rr.RecordingStream, runs: Sequence[Run], names: list[str]) -> None:
-    """Send the layout, the text, the room and all runs."""
+    """Send the layout, the text, the floor and all runs."""
     import rerun as rr
 
     shown = looks(names)
@@ -147,7 +145,7 @@ def _send(stream: rr.RecordingStream, runs: Sequence[Run], names: list[str]) -> 
 
 
 def started(name: str) -> rr.RecordingStream:
-    """Return a new recording's stream, that goes nowhere yet.
+    """Return the stream of a new recording, not connected to any output yet.
 
     Raises:
         RerunDisabledError: The environment variable RERUN switches Rerun off.
@@ -155,6 +153,7 @@ def started(name: str) -> rr.RecordingStream:
     import rerun as rr
 
     stream = rr.RecordingStream(APPLICATION, recording_id=name, send_properties=False)
+    # A stream that is switched off would take everything and record nothing.
     if not stream.is_enabled():
         raise RerunDisabledError(
             f"Rerun is switched off: RERUN must be unset or 'on', got {os.environ.get('RERUN')!r}"
@@ -164,7 +163,7 @@ def started(name: str) -> rr.RecordingStream:
 
 
 def log_room(stream: rr.RecordingStream, room: Stage) -> None:
-    """Log what does not belong to any leg: which way is up, and the floor."""
+    """Log what belongs to no single leg: which way is up, and the floor."""
     import rerun as rr
 
     stream.log("/", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
@@ -180,7 +179,7 @@ def _send_run(
     plots: list[Series],
     room: Stage,
 ) -> None:
-    """Send one run: its leg as a property and in motion, the foot, the ground, the plots."""
+    """Send one run: the leg's numbers and its motion, the foot, the ground, the plots."""
     import rerun as rr
 
     leg = run.scenario.leg
@@ -188,7 +187,7 @@ def _send_run(
     rows = drawn_rows(time)
     every = times(time, np.arange(len(time)) + 1)
     drawn = times(time[rows], rows + 1)
-    # as JSON, since a plain value keeps the type that it first had
+    # As JSON, since a plain value keeps the type that it first had.
     stream.send_property(f"{look.root}leg", rr.AnyValues(json=json.dumps(asdict(leg))))
     scene.log_leg(stream, leg, look)
     scene.send_leg(stream, leg, moved, look, drawn)
@@ -204,14 +203,15 @@ def times(time: Array, steps: Rows) -> list[rr.TimeColumn]:
     """Return both timelines at the times [s] of some steps, counted from 1."""
     import rerun as rr
 
-    stamps = np.round(time * 1e9).astype("timedelta64[ns]")  # Rerun itself would truncate
+    # Rounded here, since Rerun itself would truncate.
+    stamps = np.round(time * 1e9).astype("timedelta64[ns]")
     return [rr.TimeColumn("sim_time", duration=stamps), rr.TimeColumn("step", sequence=steps)]
 
 
 def send_series(
     stream: rr.RecordingStream, plot: Series, look: Look, times: list[rr.TimeColumn]
 ) -> None:
-    """Send all lines of a plot as one column; a row without values is an empty one, a gap."""
+    """Send all lines of a plot as one column; a row without values is empty, a gap in the line."""
     import rerun as rr
 
     style = rr.SeriesLines(

@@ -15,24 +15,25 @@ def summary(
     metrics: Sequence[Mapping[str, Any]],
     limits: Sequence[Mapping[str, tuple[float, float]]],
 ) -> str:
-    """Return Markdown: of every run verdict, tripped guards and limits; then the metrics.
+    """Return Markdown: verdict, tripped guards and limits of every run; then the metrics.
 
     Args:
-        labels: What each run is called.
-        metrics: What metrics.json says of each.
-        limits: (low, high) of each by the metric's dotted key.
+        labels: Name of each run.
+        metrics: Contents of each run's metrics.json.
+        limits: Limits (low, high) of each run by the metric's dotted key.
     """
     lines: list[str] = []
     for label, measured, own in zip(labels, metrics, limits, strict=True):
         lines += [f"## {_cell(label)}: {measured['verdict'].upper()}", ""]
-        tripped = [f"- {said}" for said in guards.tripped(measured.get("guards", []))]
+        tripped = [f"- {line}" for line in guards.tripped(measured.get("guards", []))]
         lines += [*tripped, ""] if tripped else []
-        lines += [*_limits(_judged(measured, own)), ""]
+        lines += [*_limits(_judge_all(measured, own)), ""]
 
     names = [_cell(label) for label in labels] if len(labels) > 1 else ["value"]
     lines += [f"| metric | {' | '.join(names)} |", f"|:--|{'--:|' * len(names)}"]
     for key, (name, _, _) in SHOWN.items():
         values = [_value(measured, key) for measured in metrics]
+        # A metric that no run has, as a ground's in the air, gets no row.
         if any(values):
             lines.append(f"| {name} | {' | '.join(values)} |")
 
@@ -44,8 +45,11 @@ def summary(
     return "\n".join(lines) + "\n"
 
 
-def _judged(measured: Mapping[str, Any], limits: Mapping[str, tuple[float, float]]) -> list[Limit]:
-    """Return every limit with its value; one on what was not measured is broken."""
+def _judge_all(
+    measured: Mapping[str, Any], limits: Mapping[str, tuple[float, float]]
+) -> list[Limit]:
+    """Return every limit with its value; a limit on a metric that was not measured is broken."""
+    # Sorted out first, since `judge` refuses a metric that the run lacks.
     known = {key: limit for key, limit in limits.items() if _value(measured, key)}
     return [
         *judge(measured, known),
@@ -68,7 +72,7 @@ def _limits(judged: Sequence[Limit]) -> Iterator[str]:
 
 
 def _value(measured: Mapping[str, Any], key: str) -> str:
-    """Return a metric as people read it, "" where the run has none of it."""
+    """Return a metric as people read it, "" if the run does not have it."""
     try:
         return shown(key, look_up(measured, key))
     except KeyError:
@@ -86,4 +90,5 @@ def _flat(table: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any
 
 def _cell(value: Any) -> str:
     """Return a value for one cell of a Markdown table."""
+    # A bar or a line break would end the cell.
     return " ".join(str(value).replace("|", "\\|").split())

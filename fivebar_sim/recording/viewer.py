@@ -1,4 +1,4 @@
-"""Rerun's viewer, as its wheel brings it: the native one, and the files of the one for browsers."""
+"""Rerun's viewer from its wheel: the native program, and the files of the web viewer."""
 
 from __future__ import annotations
 
@@ -15,26 +15,26 @@ from fivebar_sim.errors import FiveBarError
 LOOPBACK = "127.0.0.1"
 WEB_FILES = ("re_viewer.js", "re_viewer_bg.wasm", "favicon.ico")
 PATIENCE = 60.0
-"""How long the files of the web viewer may take [s]; they take about one."""
+"""How long fetching the files of the web viewer may take [s]; it takes about one."""
 
 
 class ViewerMissingError(FiveBarError, FileNotFoundError):
     """The installed Rerun has no viewer binary, or it gives no web viewer."""
 
 
-def quiet() -> dict[str, str]:
-    """Return this process's environment with Rerun's analytics off."""
+def quiet_environment() -> dict[str, str]:
+    """Return this process's environment with Rerun's analytics switched off."""
+    # Rerun sends none in CI.
     return {**os.environ, "CI": "true"}
 
 
 def binary() -> Path:
-    """Return the viewer's binary.
-
-    The `rerun` script on the PATH is a wrapper that outlives its viewer or dies without it.
+    """Return the path of the viewer's binary.
 
     Raises:
         ViewerMissingError: The installation lacks the binary.
     """
+    # Not the `rerun` script on the PATH: that wrapper outlives its viewer, or dies without it.
     spec = importlib.util.find_spec("rerun_cli")
     folders = [Path(folder) for folder in (spec and spec.submodule_search_locations) or []]
     for folder in folders:
@@ -46,42 +46,41 @@ def binary() -> Path:
     )
 
 
-def native(path: Path) -> list[str]:
-    """Return the command that opens a recording in a new native viewer, reachable from here only.
-
-    Rerun's viewer also serves, by default to the whole network; it binds the loopback only when
-    its command line says so.
+def native_command(path: Path) -> list[str]:
+    """Return the command that opens a recording in a new native viewer.
 
     Raises:
         ViewerMissingError: The installation lacks the binary.
     """
+    # The viewer also serves recordings, by default to the whole network: bind it to this machine.
     return [str(binary()), "--bind", LOOPBACK, "--port", "auto", str(path.resolve())]
 
 
 def web_files() -> dict[str, bytes]:
     """Return the files of the web viewer, by their names in `WEB_FILES`.
 
-    They are inside the binary, which hands them out over HTTP and no other way: it is started on
-    a free loopback port, asked, and ended. It is given an address to show, which it does not look
-    at, because without one it would also start a server for recordings.
+    They are inside the binary, which gives them out only over HTTP: it is started on a free
+    loopback port, asked for them, and ended.
 
     Raises:
         ViewerMissingError: The installation lacks the binary, or it does not give the files.
     """
     command = [str(binary()), "--serve-web", "--bind", LOOPBACK, "--web-viewer-port", "0"]
+    # Without an address to show it would start a server for recordings too; it never opens this.
     source = subprocess.Popen(
         [*command, f"http://{LOOPBACK}:1/none.rrd"],
-        env=quiet(),
+        env=quiet_environment(),
         stdin=subprocess.DEVNULL,
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
     )
+    # Reading a pipe has no time limit; killing the program ends it.
     late = threading.Timer(PATIENCE, source.kill)
     late.start()
 
     try:
         port = _port(source)
-        return {name: _fetched(port, name) for name in WEB_FILES}
+        return {name: _fetch(port, name) for name in WEB_FILES}
     except (OSError, http.client.HTTPException) as error:
         raise ViewerMissingError(f"Rerun gives no web viewer: {error}") from None
     finally:
@@ -91,18 +90,19 @@ def web_files() -> dict[str, bytes]:
 
 
 def _port(source: subprocess.Popen[bytes]) -> int:
-    """Return the port that a started web viewer says it is at."""
+    """Return the port that a started web viewer prints."""
     assert source.stdout is not None
-    said = b""
+    last = b""
     for line in source.stdout:
         found = re.search(rb"web-viewer at http://127\.0\.0\.1:(\d+)", line)
         if found:
             return int(found[1])
-        said = line
-    raise OSError(said.decode(errors="replace").strip() or "it ended without a word")
+        last = line
+    # What it printed last is the likeliest reason.
+    raise OSError(last.decode(errors="replace").strip() or "it ended without a message")
 
 
-def _fetched(port: int, name: str) -> bytes:
+def _fetch(port: int, name: str) -> bytes:
     """Return a file of the web viewer."""
     connection = http.client.HTTPConnection(LOOPBACK, port, timeout=PATIENCE)
     try:

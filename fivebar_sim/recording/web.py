@@ -1,7 +1,7 @@
 """A recording in the browser: one HTTP server on the loopback with a fixed table of pages.
 
-Rerun's own page looks for fonts and news on other hosts; this one does not, and its policy
-forbids the viewer to.
+Rerun's own page loads fonts and news from other hosts; this one does not, and its policy forbids
+the viewer to do so.
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ from fivebar_sim.recording.viewer import LOOPBACK, web_files
 POLICY = "; ".join(
     (
         "default-src 'none'",
+        # Without wasm-unsafe-eval a browser compiles no WebAssembly, and so no viewer.
         "script-src 'self' 'wasm-unsafe-eval'",
         "style-src 'self'",
         "img-src 'self'",
@@ -91,7 +92,7 @@ start().catch((error) => say("The viewer did not start: " + error));
 
 
 class Page(NamedTuple):
-    """What is served at a path: its media type and its bytes."""
+    """A page to serve: its media type and its bytes."""
 
     kind: str
     body: bytes
@@ -101,10 +102,12 @@ class Server(socketserver.ThreadingTCPServer):
     """Serves a table of pages to browsers on this machine.
 
     Attributes:
-        pages: By path; nothing else is served.
+        pages: The pages by path; nothing else is served.
     """
 
+    # A port whose last connections are still closing may be taken at once.
     allow_reuse_address = True
+    # A browser that keeps its connection open does not keep the program alive.
     daemon_threads = True
 
     def __init__(self, port: int) -> None:
@@ -112,7 +115,7 @@ class Server(socketserver.ThreadingTCPServer):
 
         Raises:
             ArgumentError: Unless 0 <= port <= 65535.
-            ConfigError: The port is taken, or not for us.
+            ConfigError: The port is taken, or needs rights that we lack.
         """
         check_number("--port", port, "", low=0, high=65535)
         self.pages: Mapping[str, Page] = {}
@@ -123,7 +126,7 @@ class Server(socketserver.ThreadingTCPServer):
 
     @property
     def port(self) -> int:
-        """The port that it is at."""
+        """The port on which it listens."""
         return self.server_address[1]
 
     @property
@@ -133,16 +136,18 @@ class Server(socketserver.ThreadingTCPServer):
 
     @property
     def hosts(self) -> tuple[str, str]:
-        """The names by which it may be called: any other is a foreign page's, aimed at this one."""
+        """The Host headers that are answered."""
+        # A foreign page can point its own host name at the loopback, to read what is served here.
         return f"{LOOPBACK}:{self.port}", f"localhost:{self.port}"
 
 
 class Handler(BaseHTTPRequestHandler):
-    """Answers GET and HEAD for the paths of the table, asked by a loopback name."""
+    """Answers GET and HEAD for the paths of the table, if the Host is a loopback name."""
 
     server: Server  # pyright: ignore[reportIncompatibleVariableOverride]
     server_version = "fivebar"
     sys_version = ""
+    # A client that connects and says nothing must not hold a thread for ever.
     timeout = 30.0
 
     def do_GET(self) -> None:
@@ -156,8 +161,9 @@ class Handler(BaseHTTPRequestHandler):
         self._page()
 
     def _page(self) -> Page | None:
-        """Send the headers of the page that is asked for and return it, or send an error."""
+        """Send the headers of the requested page and return it, or send an error."""
         page = self.server.pages.get(self.path.partition("?")[0])
+        # All Host headers at once, so that none and two are refused too.
         if self.headers.get_all("Host", []) not in [[host] for host in self.server.hosts]:
             self.send_error(HTTPStatus.FORBIDDEN)
         elif page is None:
@@ -173,16 +179,17 @@ class Handler(BaseHTTPRequestHandler):
 
     def end_headers(self) -> None:
         """Send the headers that every answer has."""
+        # Here, and not in `_page`, so that errors carry the policy too.
         for name, value in HEADERS.items():
             self.send_header(name, value)
         super().end_headers()
 
     def log_message(self, format: str, *args: object) -> None:
-        """Say nothing: the terminal is the user's."""
+        """Print nothing: the terminal is the user's."""
 
 
 def pages(recording: Path, title: str) -> dict[str, Page]:
-    """Return what is served of a recording: a page of this title, the viewer, and the recording.
+    """Return the pages for a recording: a page with this title, the viewer, and the recording.
 
     Raises:
         ViewerMissingError: The installed Rerun gives no web viewer.
