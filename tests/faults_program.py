@@ -172,7 +172,7 @@ FORCE = "extended-stance-force"
 LANDING = "doggo-landing"
 
 PATHS = (
-    Fault("ramp left out", ELLIPSE, around(base, "eased", at_once)),
+    Fault("ramp left out", ELLIPSE, around(base, "ease", at_once)),
     Fault("gait a quarter of a period on", "treadmill-trot", around(Gait, "nominal", a_quarter_on)),
     Fault("path run backwards", CIRCLE, around(shapes, "_orbit", backwards)),
     Fault("path 1 % fast", ELLIPSE, around_property(Ellipse, "omega", lambda w, _: 1.01 * w)),

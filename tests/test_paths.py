@@ -26,7 +26,7 @@ from fivebar_sim.paths import (
     PathSpec,
     Sample,
 )
-from fivebar_sim.paths.base import eased
+from fivebar_sim.paths.base import ease
 
 RAMP = 0.25
 KNOTS = np.array([0.0, 0.05, 0.13, 0.18, 0.3, 0.37, 0.45])
@@ -65,7 +65,7 @@ def difference(after: Sample, before: Sample) -> np.ndarray:
 
 @given(ramp=st.floats(1e-3, 10.0), tau=st.floats(0.0, 2.0))
 def test_ramp_is_never_faster_than_the_path(ramp: float, tau: float) -> None:
-    s, s_dot, _ = eased(np.array(ramp * tau), ramp)
+    s, s_dot, _ = ease(np.array(ramp * tau), ramp)
     assert 0.0 <= s_dot <= 1.0 + 1e-15  # rounding of a sum that nears 1
     assert max(0.0, tau - 0.5) * ramp * (1.0 - 1e-12) <= s <= ramp * tau
 

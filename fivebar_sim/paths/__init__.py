@@ -1,6 +1,6 @@
 """Foot paths: position, velocity and acceleration of the foot F over time, in the hip frame.
 
-A path is a frozen table of numbers with a `kind`; `path.at(time)` is what the foot shall do.
+A path is a frozen table of numbers with a `kind`; `path.at(time)` is the foot's target.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What every foot path has: a ramp from rest, a range of times, and checked numbers."""
+"""The base of all foot paths: a ramp from rest, a range of times, and checked numbers."""
 
 from __future__ import annotations
 
@@ -16,7 +16,6 @@ from fivebar_sim.errors import ArgumentError
 
 TIME_ROUNDING = 1e-9
 """Times may pass the end of a path by this fraction of it: the rounding of a long sum of steps."""
-
 
 FARTHEST = 1e3
 """Upper end of coordinates [m]."""
@@ -47,17 +46,17 @@ class Sample(NamedTuple):
 class FootPath(
     msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True, tag_field="kind"
 ):
-    """A foot path p(t), begun from rest.
+    """A foot path p(t) that starts from rest.
 
     A kind of path overrides `nominal`, the path at its own time, and `period` if it repeats, `span`
     if it stops, or `moves` if it ends in a hold.
 
     Attributes:
-        needs_ground: Whether the path means nothing without a ground under the foot.
+        needs_ground: Whether the path makes no sense without a ground under the foot.
         ramp: How long the path takes to reach its own speed, from rest [s]; from then on it is half
-            of that late, see `at`. 0 starts at speed, and on time.
-        outside: What becomes of targets that the leg cannot reach: "refuse" the path, or go to the
-            "nearest" point that it reaches; see `motion.plan`.
+            a ramp late, see `at`. With 0 it starts at speed, and on time.
+        outside: What to do with targets out of reach: "refuse" the path, or go to the "nearest"
+            reachable point; see `motion.plan`.
     """
 
     needs_ground: ClassVar[bool] = False
@@ -110,15 +109,15 @@ class FootPath(
     def at(self, time: ArrayLike) -> Sample:
         """Return the path, eased from rest within the ramp.
 
-        The nominal path p is run through at its own time s(t), with T = ramp, tau = t / T:
+        The nominal path p is followed at its own time s(t), with T = ramp, tau = t / T:
 
             s' = 10 tau^3 - 15 tau^4 + 6 tau^5   for t < T,   s = t - T / 2   from then on
             position = p(s),   velocity = p' s',   acceleration = p'' s'^2 + p' s''
 
         s' rises from 0 at t = 0 to 1 at t = T, s'' is 0 at both. So the foot starts from rest and
-        is never faster than on the nominal path; what it accelerates by along the path, up to
-        1.9 |p'| / T, is less than the path's own where the ramp is half a period or more. The
-        price: from t = ramp on this is the nominal path half a ramp late.
+        is never faster than on the nominal path; the acceleration of the ramp, up to 1.9 |p'| / T,
+        is less than the path's own if the ramp is half a period or more. The price: from t = ramp
+        on the path is half a ramp late.
 
         Args:
             time: [s], shape (...).
@@ -130,8 +129,8 @@ class FootPath(
             ArgumentError: Unless every time is in [0, end].
         """
         t = times(time, self.end)
-        s, s_dot, s_ddot = (rate[..., None] for rate in eased(t, self.ramp))
-        # Chain rule: the path as a curve, run through at its own time s(t).
+        s, s_dot, s_ddot = (rate[..., None] for rate in ease(t, self.ramp))
+        # Chain rule: the path is a curve that is followed at its own time s(t).
         p = self.nominal(s[..., 0])
         return Sample(
             position=p.position,
@@ -140,7 +139,7 @@ class FootPath(
         )
 
     def cycle(self, time: ArrayLike) -> Array:
-        """Return how far the path is in its period, as eased in `at`.
+        """Return how far the path is within its period, with the ramp of `at`.
 
         Args:
             time: [s], shape (...).
@@ -153,7 +152,7 @@ class FootPath(
         """
         if self.period is None:
             raise ArgumentError("a path that does not repeat has no cycle")
-        return np.mod(eased(times(time, self.end), self.ramp)[0] / self.period, 1.0)
+        return np.mod(ease(times(time, self.end), self.ramp)[0] / self.period, 1.0)
 
     def resolve(self, folder: Path) -> Self:
         """Return the path with its files read and checked; names are relative to folder.
@@ -165,7 +164,7 @@ class FootPath(
         return self
 
     def _times(self, time: ArrayLike) -> Array:
-        """Return times of the nominal path [s], those past its span by rounding set to the span."""
+        """Return times of the nominal path [s]; a time past its span by rounding is set to it."""
         return times(time, self.span)
 
 
@@ -189,7 +188,7 @@ class Cyclic(FootPath, frozen=True):
 
 
 def times(time: ArrayLike, end: float) -> Array:
-    """Return times as an array [s], those past the end by rounding set to the end.
+    """Return times as an array [s]; a time past the end by rounding is set to the end.
 
     Args:
         time: [s], shape (...).
@@ -211,7 +210,7 @@ def times(time: ArrayLike, end: float) -> Array:
     return np.minimum(t, end)
 
 
-def eased(time: Array, ramp: float) -> tuple[Array, Array, Array]:
+def ease(time: Array, ramp: float) -> tuple[Array, Array, Array]:
     """Return the path's own time s [s] of `FootPath.at` with its rates s' and s'' [1/s].
 
         s = T (5/2 tau^4 - 3 tau^5 + tau^6),   s' = 10 tau^3 - 15 tau^4 + 6 tau^5,
@@ -232,7 +231,7 @@ def eased(time: Array, ramp: float) -> tuple[Array, Array, Array]:
 
 
 def check_ramp(path: FootPath) -> None:
-    """Raise unless the ramp is at most as long as the path moves: one that is mostly ramp is none.
+    """Raise unless the ramp ends before the path's own motion does.
 
     Raises:
         ArgumentError: Unless ramp <= moves.
@@ -250,8 +249,8 @@ def check_pair(
     """Raise unless a key of a frozen Struct is a pair of numbers; keep it as a tuple of floats.
 
     Args:
-        spec: What has the key.
-        key: Its name; messages start with it.
+        spec: The Struct with the key.
+        key: Name of the key; messages start with it.
         unit: Unit of both numbers, for messages.
         high: Upper end of their size.
         positive: Whether both must be above 0.
@@ -260,6 +259,7 @@ def check_pair(
         ArgumentError: Not two numbers, or one out of range.
     """
     pair = pair_of(key, getattr(spec, key), unit, high=high, positive=positive)
+    # A Struct made in Python keeps what it is given, lists and integers too; this one is frozen.
     msgspec.structs.force_setattr(spec, key, pair)
 
 

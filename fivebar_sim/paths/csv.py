@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from scipy.interpolate import CubicSpline
 
 HEADERS = {("time_s", "x_mm", "z_mm"): 1e-3, ("time_s", "x_m", "z_m"): 1.0}
-"""The legal headers, each with the length of its unit [m]."""
+"""The legal headers, each with its unit in metres."""
 
 
 class _Curve(NamedTuple):
@@ -32,19 +32,20 @@ class _Curve(NamedTuple):
     period: float | None
 
 
+# dict=True: cached_property stores its value in the object's __dict__, which a Struct lacks.
 class Csv(FootPath, frozen=True, tag="csv", dict=True):
     """A cubic spline in time through the points of a CSV file, smooth up to the acceleration.
 
     The file's first time becomes t = 0. The file is read when first needed, once per object;
     `resolve` reads it at once.
 
-    A periodic path whose last point repeats the first has the sampled span for a period. Otherwise
+    The period of a periodic path is the sampled span if its last point repeats the first. Otherwise
     it returns to its first point after one more sampling interval, the median one, or at `period`.
 
     Attributes:
         file: Name of the CSV, relative to the scenario's folder (unresolved: the current one).
         periodic: Whether the path repeats, smoothly across the seam; else it ends with its file.
-        given: The key `period` of a table: the period, where the rule above is not meant [s].
+        given: The key `period` of a table: overrides the rule above [s].
     """
 
     file: str
@@ -53,6 +54,7 @@ class Csv(FootPath, frozen=True, tag="csv", dict=True):
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        # No system takes a null byte in a name: Python raises a bare ValueError for one.
         if not self.file or "\0" in self.file:
             raise ArgumentError(f"file must be the name of a CSV file, got {self.file!r}")
         if self.given is not None:
@@ -77,7 +79,7 @@ class Csv(FootPath, frozen=True, tag="csv", dict=True):
 
         Raises:
             ArgumentError: Unless every time is in [0, span].
-            ConfigError: What `resolve` would raise, if the file was not read yet.
+            ConfigError: As `resolve`, if the file was not read yet.
         """
         spline, _, period = self._curve
         t = self._times(time)
@@ -99,7 +101,8 @@ class Csv(FootPath, frozen=True, tag="csv", dict=True):
 
     @cached_property
     def _curve(self) -> _Curve:
-        from scipy.interpolate import CubicSpline  # slow to import, and only this kind needs it
+        # Slow to import, and only this kind of path needs it.
+        from scipy.interpolate import CubicSpline
 
         track = read_track(Path(self.file), HEADERS, "foot path")
         if not self.periodic:
@@ -110,11 +113,11 @@ class Csv(FootPath, frozen=True, tag="csv", dict=True):
                 )
             return _Curve(CubicSpline(*track, bc_type="not-a-knot"), track.span, None)
 
-        time, foot = _closed(track, self.given, self.file)
+        time, foot = _close_loop(track, self.given, self.file)
         return _Curve(CubicSpline(time, foot, bc_type="periodic"), track.span, float(time[-1]))
 
 
-def _closed(track: Track, period: float | None, where: str) -> Track:
+def _close_loop(track: Track, period: float | None, where: str) -> Track:
     """Return a track whose last point is its first, one period later."""
     time, foot = track
     span = track.span

@@ -7,28 +7,28 @@ from numpy.typing import ArrayLike
 
 from fivebar_sim.arrays import Array, Bools
 from fivebar_sim.checks import check_number
-from fivebar_sim.paths.base import FARTHEST, Cyclic, Pair, Sample, check_pair, eased, times
+from fivebar_sim.paths.base import FARTHEST, Cyclic, Pair, Sample, check_pair, ease, times
 from fivebar_sim.paths.quintic import STEEPEST, arch, pieces
 
 
 class Gait(Cyclic, frozen=True, tag="gait"):
-    """Stance and swing of one leg, in the hip frame, begun in the middle of the stance.
+    """Stance and swing of one leg, in the hip frame, starting in the middle of the stance.
 
-    The foot stands for the fraction duty of each period: it goes straight back along x at
-    `stance_speed`, as a ground does under a body that moves forward. Then it swings back to the
+    The foot stands for the fraction duty of each period: it moves straight back along x at
+    `stance_speed`, like the ground under a body that moves forward. Then it swings back to the
     front; see `nominal`.
 
     Within the ramp all speeds are those of `FootPath.at`, s' times the nominal ones: the stance
-    speed rises from 0 to its nominal value at t = ramp. A belt that runs at the constant
-    `stance_speed` slips against the foot until then. With ramp <= duty / frequency all of it
-    happens in the first stance.
+    speed rises from 0 to its nominal value at t = ramp. Until then a belt that runs at the constant
+    `stance_speed` slips against the foot. With ramp <= duty / frequency this happens in the first
+    stance alone.
 
     Attributes:
         centre: (x, z) of the middle of the stance line [m]; z is that of the ground.
         stride: Length of the stance line [m]: the body moves on by stride / duty in each period.
             Negative walks towards -x; 0 steps on the spot.
         lift: Height of the swing above the ground [m].
-        duty: Duty factor: the part of a period that is stance, in (0, 1).
+        duty: Duty factor: the fraction of a period that is stance, in (0, 1).
         touchdown: Downward speed of the foot at the end of the swing [m/s].
     """
 
@@ -57,7 +57,7 @@ class Gait(Cyclic, frozen=True, tag="gait"):
         return STEEPEST * self.lift * self.frequency / (0.5 * (1.0 - self.duty))
 
     def cycle(self, time: ArrayLike) -> Array:
-        """Return the time since the planned touch-down, in periods, eased as in `FootPath.at`.
+        """Return the time since the planned touch-down, in periods, with the ramp of the path.
 
         Args:
             time: [s], shape (...).
@@ -68,10 +68,10 @@ class Gait(Cyclic, frozen=True, tag="gait"):
         Raises:
             ArgumentError: Unless every time is in [0, inf).
         """
-        return self._cycle(eased(times(time, self.end), self.ramp)[0])
+        return self._cycle(ease(times(time, self.end), self.ramp)[0])
 
     def in_stance(self, time: ArrayLike) -> Bools:
-        """Return whether the foot is planned to stand, from touch-down until before lift-off.
+        """Return whether the foot is planned to stand: from touch-down up to lift-off.
 
         Args:
             time: [s], shape (...).
@@ -90,10 +90,10 @@ class Gait(Cyclic, frozen=True, tag="gait"):
             swing, c >= duty:   x: a quintic from cx - stride/2 to cx + stride/2, x' = -v, x'' = 0
                                 at both ends;   z: the `arch` of lift, up and down in T/2 each
 
-        Position, velocity and acceleration are continuous, in and between the pieces, but for one:
-        at touch-down z' jumps from -touchdown to 0, since the ground stops the foot; the value at
-        that instant is 0. The foot overshoots the stance line at both ends of the swing, as it must
-        turn round.
+        Position, velocity and acceleration are continuous, within and between the pieces, with one
+        exception: at touch-down z' jumps from -touchdown to 0, since the ground stops the foot; the
+        value at that instant is 0. The foot overshoots the stance line at both ends of the swing,
+        where it must turn round.
         """
         cycle = self._cycle(self._times(time))
         duty = self.duty
@@ -116,4 +116,5 @@ class Gait(Cyclic, frozen=True, tag="gait"):
         )
 
     def _cycle(self, time: Array) -> Array:
+        # Half a stance after touch-down at t = 0: the ramp from rest begins on the ground.
         return np.mod(time * self.frequency + 0.5 * self.duty, 1.0)

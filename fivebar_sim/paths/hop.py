@@ -14,13 +14,13 @@ from fivebar_sim.paths.quintic import arch, pieces
 
 
 class Hop(Cyclic, frozen=True, kw_only=True, tag="hop"):
-    """Periodic push-off straight down, begun in the crouch; see `nominal`.
+    """Periodic push-off straight down, starting in the crouch; see `nominal`.
 
     With h = -z the length of the leg, a body that rides on it leaves the ground where the leg, at
-    the end of the thrust, brakes by more than gravity, h'' < -g: so if `braking` > g. It flies as
-    high as the greatest h + h'^2 / 2g of the thrust, whatever its mass, if the motors follow. Back
-    on the ground it stays there through the crouch if `braking` with the crouch's part
-    1 - thrust - flight of a period in place of thrust is less than g.
+    the end of the thrust, brakes by more than gravity, h'' < -g: that is, if `braking` > g. It
+    flies as high as the greatest h + h'^2 / 2g of the thrust, whatever its mass, if the motors
+    follow. After landing it stays on the ground through the crouch if `braking`, with the crouch's
+    part 1 - thrust - flight of a period in place of thrust, is less than g.
 
     It starts from rest by itself, so its ramp is 0 unless given.
 
@@ -46,6 +46,7 @@ class Hop(Cyclic, frozen=True, kw_only=True, tag="hop"):
     def __post_init__(self) -> None:
         super().__post_init__()
         check_number("x", self.x, "m", low=-FARTHEST, high=FARTHEST)
+        # In this order: the range of each number depends on the one before.
         check_number("high", self.high, "m", low=0.0, high=FARTHEST, strict=True)
         check_number("low", self.low, "m", low=0.0, high=self.high, strict=True)
         check_number("thrust", self.thrust, "", low=0.0, high=1.0, strict=True)

@@ -15,7 +15,7 @@ from fivebar_sim.paths.base import LONGEST, FootPath, Pair, Sample, check_ramp, 
 class Lines(FootPath, frozen=True, kw_only=True, tag="lines"):
     """Straight lines from points[0] to the last point, then held there; see `nominal`.
 
-    It starts at full speed: a ramp is 0 unless given.
+    It starts at full speed: its ramp is 0 unless given.
 
     Attributes:
         points: (x, z) [m] of at least two points.
@@ -58,9 +58,9 @@ class Lines(FootPath, frozen=True, kw_only=True, tag="lines"):
 
             p = p_k + (p_k+1 - p_k) (t - t_k) / seconds_k   for t_k <= t < t_k+1
 
-        The velocity is constant on each line and jumps at the points, where it is already that of
-        the next line; it is 0 from the last point on. The acceleration is 0: the jumps, which are
-        infinite ones, are not in it.
+        The velocity is constant on each line and jumps at the points, where it has the value of the
+        next line; it is 0 from the last point on. The acceleration is 0: the infinite ones of the
+        jumps are left out.
         """
         t = self._times(time)
         knots = self._knots()

@@ -13,7 +13,7 @@ APEX = -6.0
 """Second rate p'' at the top of an `arch`, in lift / half^2."""
 
 STEEPEST = 3.0
-"""Steepest end of an `arch`, in lift / half: up to there it falls all the way from its top."""
+"""Steepest end of an `arch`, in lift / half: any steeper, it would rise above its top first."""
 
 
 def pieces(knots: list[Knot], t: Array) -> tuple[Array, Array, Array]:
@@ -27,8 +27,8 @@ def pieces(knots: list[Knot], t: Array) -> tuple[Array, Array, Array]:
         c4 = (-15 P + 7 V T - A T^2) / T^4,   c5 = (6 P - 3 V T + A T^2 / 2) / T^5
 
     Args:
-        knots: At least two, abscissas growing.
-        t: Not before the first knot, shape (...); from the last knot on the curve is at rest there.
+        knots: At least two knots with growing abscissas.
+        t: Abscissas from the first knot on, shape (...); past the last knot the curve rests there.
 
     Returns:
         p, p', p'', each (...).
@@ -37,7 +37,7 @@ def pieces(knots: list[Knot], t: Array) -> tuple[Array, Array, Array]:
     t0, p0, v0, a0 = knot[:-1].T
     t1, p1, v1, a1 = knot[1:].T
     T = t1 - t0
-    # What the start alone would miss at the end: the three upper coefficients make it good.
+    # By how much the start alone misses the end: the three upper coefficients make up for it.
     P = p1 - p0 - v0 * T - 0.5 * a0 * T**2
     V = v1 - v0 - a0 * T
     A = a1 - a0
@@ -52,12 +52,13 @@ def pieces(knots: list[Knot], t: Array) -> tuple[Array, Array, Array]:
     c3 = c3[k]
     c4 = c4[k]
     c5 = c5[k]
-    # Horner's rule.
+    # Horner's rule: fewer operations than powers of r, and less rounding.
     p = p0[k] + r * (v0 + r * (0.5 * a0 + r * (c3 + r * (c4 + r * c5))))
     v = v0 + r * (a0 + r * (3.0 * c3 + r * (4.0 * c4 + r * 5.0 * c5)))
     a = a0 + r * (6.0 * c3 + r * (12.0 * c4 + r * 20.0 * c5))
     held = t >= t1[-1]
 
+    # At rest on the last knot itself, without the rounding of the polynomial.
     return np.where(held, p1[-1], p), np.where(held, 0.0, v), np.where(held, 0.0, a)
 
 

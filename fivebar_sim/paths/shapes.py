@@ -96,7 +96,6 @@ class Line(Cyclic, frozen=True, tag="line"):
         start = np.array(self.start)
         stop = np.array(self.stop)
         span = stop - start
-        # from the nearer end: exact at both
         # Measured from the nearer end, so that both ends are met to the last bit.
         position = np.where(tau < 0.5, start + span * h, stop - span * (1.0 - h))
 

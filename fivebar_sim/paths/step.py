@@ -11,7 +11,7 @@ from fivebar_sim.paths.quintic import arch, pieces
 
 
 class Step(FootPath, frozen=True, kw_only=True, tag="step"):
-    """One step from start to stop, then held there; see `nominal`.
+    """One step from start to stop, then a hold there; see `nominal`.
 
     It starts from rest by itself, so its ramp is 0 unless given.
 
@@ -59,5 +59,6 @@ class Step(FootPath, frozen=True, kw_only=True, tag="step"):
         p, dp, ddp = (
             a[..., None] * span + b[..., None] * up for a, b in zip(line, bump, strict=True)
         )
+        # From the end of the step on exactly stop, whatever start + span rounds to.
         position = np.where(u[..., None] < 1.0, np.array(self.start) + p, np.array(self.stop))
         return Sample(position, dp / self.seconds, ddp / self.seconds**2)

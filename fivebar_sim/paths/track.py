@@ -52,8 +52,8 @@ def read_track(file: Path, headers: Headers, what: str) -> Track:
 
     Args:
         file: The CSV.
-        headers: The legal headers (time, x, z), each with the size of its unit of x and z.
-        what: What the file holds, for messages: "foot path".
+        headers: The legal headers (time, x, z), each with its unit of x and z in SI.
+        what: Kind of content, for messages: "foot path".
 
     Raises:
         ConfigError: The file cannot be read, is not UTF-8, has another header, a row with the wrong
@@ -101,7 +101,7 @@ def _lines(file: Path, what: str) -> list[tuple[int, list[str]]]:
         raise ConfigError(f"cannot read {what} {file}: {error.strerror}") from None
 
     try:
-        # -sig: spreadsheets put a byte order mark in front.
+        # -sig: some spreadsheets put a byte order mark in front.
         text = raw.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         number = raw.count(b"\n", 0, error.start) + 1
@@ -117,7 +117,7 @@ def _lines(file: Path, what: str) -> list[tuple[int, list[str]]]:
 
 
 def _columns(header: list[str], headers: Headers, where: str) -> tuple[list[int], float]:
-    """Return where time, x and z stand in a header, and the size of its unit."""
+    """Return the columns of time, x and z in a header, and its unit in SI."""
     for legal, scale in headers.items():
         if sorted(header) == sorted(legal):
             return [header.index(name) for name in legal], scale
