@@ -1,4 +1,4 @@
-"""What the foot reaches: regions, their boundary, their singular curves."""
+"""The workspace of the foot: regions, their boundary, their singular curves."""
 
 from fivebar_sim.workspace.region import boundary, distance, nearest, reachable, singular_curves
 

@@ -1,8 +1,8 @@
-"""Coupler curves: what a point on the middle link of a four-bar draws, as dense polylines.
+"""Coupler curves: the path of a point on the middle link of a four-bar, as dense polylines.
 
-A curve is kept as its poses q of `FourBar`. Between two neighbours a point is found from the chord
-in q, set onto G = 0 by Newton steps along dG/dq. That has no special pose but the curve's double
-points (both pivots, B and C in line), whereas an angle alone would have its dead centres.
+A curve is kept as its poses q of `FourBar`. A point between two neighbours is found on the chord in
+q, and set onto G = 0 by Newton steps along dG/dq. The only special poses are the curve's double
+points (both pivots, B and C in line), whereas a single angle as parameter has dead centres.
 """
 
 from __future__ import annotations
@@ -18,20 +18,20 @@ from fivebar_sim.workspace.four_bar import EXACT, FourBar
 from fivebar_sim.workspace.roots import crossing, lowest
 
 STEP = 0.04
-"""How far neighbours are apart at most: in both angles and in the direction of F's velocity [rad],
+"""Largest difference between neighbours: in both angles and in the direction of F's velocity [rad],
 and in F over `FourBar.scale`."""
 
 FLOOR = 1e-7
-"""Neighbours nearer than this in both angles [rad] are not parted for a turn of the velocity."""
+"""Neighbours closer than this in both angles [rad] are not split for a turn of the velocity."""
 
 SPLITS = 60
-"""Halvings at most of a step in tracing: to a float's last place."""
+"""Most halvings of a step in tracing: down to a float's last place."""
 
 
 def spans(radius: float, base: float, low: float, high: float) -> list[tuple[float, float]]:
     """Return the angles x at which low <= |radius e^(i x) - base| <= high, as intervals.
 
-    At a distance r the angle is, with nothing lost near 0 and pi,
+    At a distance r the angle is, without loss of digits near 0 and pi,
 
         x = 2 atan2(sqrt(r^2 - (radius - base)^2), sqrt((radius + base)^2 - r^2))
 
@@ -73,7 +73,8 @@ def trace(bar: FourBar) -> list[Array]:
     tiny = EXACT * bar.scale
     whole = np.linspace(0.0, 2.0 * np.pi, round(2.0 * np.pi / STEP) + 2)
 
-    if bar.coupler <= tiny:  # B and C are one pin, about which the foot turns
+    # Without a coupler B and C are one pin, about which the foot turns.
+    if bar.coupler <= tiny:
         ends = {x for x, y in spans(bar.crank, bar.base, *reach) if y - x < 2.0 * np.pi}
         return [np.stack([np.full_like(whole, x), whole], axis=-1) for x in sorted(ends)]
 
@@ -85,14 +86,16 @@ def trace(bar: FourBar) -> list[Array]:
             poses = [partial(_swinging, bar, 0.5 * (start + stop), 0.5 * (stop - start))]
         curves += [piece for pose in poses for piece in _sample_poses(bar, pose)]
 
+    # B rests on the second pivot: the coupler turns, and the crank's angle does not change.
     if abs(bar.crank - bar.base) <= tiny and abs(bar.coupler - rocker) <= tiny:
         curves.append(np.stack([np.zeros_like(whole), whole], axis=-1))
     return curves
 
 
 def cut(bar: FourBar, q: Array, f: Callable[[Array], Array]) -> Array:
-    """Return a polyline q (n, 2) with the poses put in at which f changes its sign."""
-    q = _part_double_roots(bar, q, f)
+    """Return a polyline q (n, 2) with the poses inserted at which f changes its sign."""
+    # Two roots within one segment leave no change of sign at its ends: split it first.
+    q = _split_double_roots(bar, q, f)
     value = f(q)
     rows = np.flatnonzero(value[:-1] * value[1:] < 0.0)
     start = q[rows]
@@ -102,11 +105,11 @@ def cut(bar: FourBar, q: Array, f: Callable[[Array], Array]) -> Array:
     return np.insert(q, rows + 1, bar.between(start, dq, s), axis=0)
 
 
-def _part_double_roots(bar: FourBar, q: Array, f: Callable[[Array], Array]) -> Array:
-    """Return a polyline with the poses put in that part two roots of f on one segment.
+def _split_double_roots(bar: FourBar, q: Array, f: Callable[[Array], Array]) -> Array:
+    """Return a polyline with a pose inserted between any two roots of f on one segment.
 
-    At both ends of such a segment f has one sign. The other is looked for where f is as near to
-    zero as it moves from one pose to the next.
+    At both ends of such a segment f has the same sign. The other sign is searched for where f is as
+    close to zero as it changes from one pose to the next.
     """
     value = f(q)
     step = np.abs(np.diff(value))
@@ -123,7 +126,8 @@ def _part_double_roots(bar: FourBar, q: Array, f: Callable[[Array], Array]) -> A
     dq = q[rows + 1] - q[rows]
     s = lowest(lambda s: sign[rows] * f(bar.between(start, dq, s)), len(rows))
     found = bar.between(start, dq, s)
-    keep = sign[rows] * f(found) < 0.0  # f goes through zero and comes back
+    # Only where f goes through zero and comes back; elsewhere it just came near.
+    keep = sign[rows] * f(found) < 0.0
 
     return np.insert(q, rows[keep] + 1, found[keep], axis=0)
 
@@ -133,7 +137,8 @@ def runs(q: Array, chosen: Bools) -> list[Array]:
     # Compared as directions, since a whole turn of the crank adds 2 pi.
     closed = np.allclose(np.exp(1j * q[0]), np.exp(1j * q[-1]), rtol=0, atol=1e-9)
     if closed and not chosen.all() and chosen[0] and chosen[-1]:
-        first = int(np.argmin(chosen))  # begin in a gap
+        # Start in a gap, so that no piece is cut in two at the seam.
+        first = int(np.argmin(chosen))
         whole = q[-1] - q[0]
         q = np.concatenate([q[first:-1], q[: first + 1] + whole])
         chosen = np.roll(chosen, -first)
@@ -165,7 +170,7 @@ def _on_side(bar: FourBar, theta: Array, side: Array) -> Array:
 def _sample_poses(bar: FourBar, pose: Callable[[Array], Array]) -> list[Array]:
     """Return the poses of 0 <= t <= 2 pi, so dense that neighbours are within `STEP`.
 
-    A jump, which no halving of t fills, parts the polyline.
+    The polyline is cut at jumps, which no halving of t fills.
     """
     t = np.linspace(0.0, 2.0 * np.pi, 65)
     q = pose(t)

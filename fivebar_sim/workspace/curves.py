@@ -1,4 +1,4 @@
-"""Coupler curves as one sampling, and the points of them that are nearest to given points."""
+"""Coupler curves as one set of samples, and their points nearest to given points."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ class Curves(NamedTuple):
         F: Feet of the poses [m], (n,).
         first: Pose at which each segment starts; it ends at the next, (m,).
         q: The poses (theta_A, theta_B) at which segments start [rad], (m, 2).
-        dq: From there to the next, (m, 2).
+        dq: Difference to the next pose [rad], (m, 2).
         rocker: |EC| of each segment [m], (m,).
-        leave: Velocity of F at the segment's start, of one radian [m], (m,).
-        arrive: Velocity of F at its end, (m,).
+        leave: Velocity of F at the segment's start, per radian along the curve [m], (m,).
+        arrive: The same at its end [m], (m,).
         ends: Start and stop in F of each connected piece, (k, 2).
     """
 
@@ -39,7 +39,7 @@ class Curves(NamedTuple):
 
 
 def gather(pieces: list[tuple[FourBar, Array]]) -> Curves:
-    """Return polylines of poses as one sampling."""
+    """Return polylines of poses as one set of samples."""
     count = np.array([len(q) for _, q in pieces], dtype=np.intp)
     stop = np.cumsum(count)
     ends = np.stack([stop - count, stop], axis=-1)
@@ -62,8 +62,8 @@ def nearest_on(curves: Curves, bar: FourBar, p: Complex) -> tuple[Rows, Complex,
     """Return the points of the curves at which |p - F| is least, and the nearest poses.
 
     |p - F| has a minimum within a segment if (p - F) . dF changes from above 0 to below. Segments
-    that cannot come nearer than the nearest pose are left out: none of their points is farther from
-    both their ends than half of their arc, which `STEP` keeps within 1.02 times the chord.
+    that cannot come nearer than the nearest pose are left out: no point of a segment is farther
+    from both ends than half of its arc, which `STEP` keeps within 1.02 times the chord.
 
     Args:
         curves: The curves.
@@ -109,9 +109,11 @@ def _near_segments(curves: Curves, p: Complex) -> tuple[Rows, Rows, Rows]:
     d = np.abs(p[:, None] - curves.F)
     pose = d.argmin(axis=1)
     least = d[np.arange(len(p)), pose][:, None]
-    half = 0.51 * np.abs(curves.F[curves.first + 1] - curves.F[curves.first])  # of the arc
+    # Half of the arc, from the chord; see `nearest_on`.
+    half = 0.51 * np.abs(curves.F[curves.first + 1] - curves.F[curves.first])
     reach = np.minimum(d[:, curves.first], d[:, curves.first + 1]) - half
-    owner, segment = np.nonzero(reach <= least * (1.0 + 1e-12))  # equal to rounding stays in
+    # A segment that is equally near to rounding stays in.
+    owner, segment = np.nonzero(reach <= least * (1.0 + 1e-12))
     return pose, owner, segment
 
 

@@ -4,15 +4,15 @@ The foot F lies beyond C, fixed to L2, at rho = |BF|. For either elbow of side A
 
     |L1 - rho| <= |AF| <= L1 + rho   and   |L4 - L3| <= |EC| <= L4 + L3,   C = C(F, s_A)
 
-and the workspace is what the two elbows reach together. So its boundary is made of
+and the workspace is the union of what the two elbows reach. So its boundary is made of
 
     arcs of the two circles about A (A, B, F in line, so both elbows are one), where E reaches C
     coupler curves (E, D, C in line: C on a circle about E) of the two four-bars A, B, C, E with
         the rocker |L4 - L3| or L4 + L3, where the other elbow does not reach F
 
-An arc ends where a coupler curve touches it, and a coupler curve where it meets one of the other
+An arc ends where a coupler curve touches it; a coupler curve ends where it meets one of the other
 elbow's, or touches a circle. Both are poses at which the other elbow's C is on a circle about E.
-Of the workspace of one elbow alone, a coupler curve is boundary as far as it has that elbow.
+In the workspace of one elbow alone, a coupler curve is boundary as far as it has that elbow.
 
 In this file the plane is complex, with the origin at A and E on the positive real axis.
 """
@@ -36,10 +36,10 @@ from fivebar_sim.workspace.curves import Curves, Rows, gather, nearest_on
 from fivebar_sim.workspace.four_bar import Complex, FourBar, turn
 
 SAME = 1e-13
-"""Two elbows whose reach differs by less, relative to the leg's size, end on one boundary."""
+"""Two elbows whose reach differs by less, relative to the leg's size, share their boundary."""
 
 SHORTEST = 1e-9
-"""Least |BF| relative to the leg's size: of a foot on B no inverse kinematics can find L2."""
+"""Least |BF| relative to the leg's size: with the foot on B the direction of L2 is undefined."""
 
 
 class Circle(NamedTuple):
@@ -61,7 +61,7 @@ class Extended(NamedTuple):
         leg: The leg.
         elbow: s_A, or 0 for both elbows together.
         bar: The four-bar A, B, C, E; its rocker is the outer radius of E's reach.
-        circles: About A, inner first.
+        circles: The circles about A, inner first.
         curves: The coupler curves' parts on the boundary.
     """
 
@@ -73,7 +73,7 @@ class Extended(NamedTuple):
 
     @property
     def block(self) -> int:
-        """Points to solve at a time: a million distances."""
+        """Points to solve at a time, so that a block takes about a million distances."""
         return max(64, 2**20 // max(1, len(self.curves.F)))
 
     @property
@@ -82,22 +82,23 @@ class Extended(NamedTuple):
         return self.circles[-1].radius
 
     def holds(self, points: Array) -> Bools:
-        """Return where the elbow, or either, reaches: as `kinematics.inverse_all` decides."""
+        """Return where the elbow, or either of both, reaches; `kinematics.inverse_all` decides."""
         modes = [k for k, mode in enumerate(MODES) if self.elbow in (0, mode[0])]
         theta_A = inverse_all(self.leg, points)[..., modes, 0]
         return np.asarray(np.isfinite(theta_A).any(axis=-1))
 
-    def moves(self) -> Iterator[tuple[float, float]]:
+    def nudges(self) -> Iterator[tuple[float, float]]:
         """Yield how far to move a lost boundary point, outward from A and around it [m].
 
-        By units in the last place that double, up to 2e-7 of the leg's size: where A, B and F are
-        in line C moves with the square root of F's rounding, and one elbow alone is lost there.
+        Units in the last place that double, up to 2e-7 of the leg's size.
         """
+        # So far, since C moves with the square root of F's rounding where A, B and F are in line,
+        # and a single elbow is out of reach there.
         ulp = float(np.spacing(self.scale))
         for step in (ulp * 2.0**k for k in range(-2, 30)):
             yield from product((0.0, -step, step, -4.0 * ulp, 4.0 * ulp), (0.0, -step, step))
 
-    def moved(self, points: Array, out: float, around: float) -> Array:
+    def nudge(self, points: Array, out: float, around: float) -> Array:
         """Return points moved outward from A and around it [m]."""
         z = from_hip(self.leg, points)
         r = np.abs(z)
@@ -108,8 +109,8 @@ class Extended(NamedTuple):
     def boundary_point(self, points: Array) -> Array:
         """Return the point of the boundary that is nearest to each of points (n, 2).
 
-        Of all candidates c the one that gains most on b, the nearest pose of the sampling, is
-        taken; the first of those equal to rounding:
+        Of all candidates c the one that gains most on b, the nearest of the sampled poses, is
+        taken; of those that are equal to rounding the first:
 
             |p - b| - |p - c| = (c - b) . (2 p - b - c) / (|p - b| + |p - c|)
         """
@@ -127,9 +128,10 @@ class Extended(NamedTuple):
         if np.isinf(most).any():
             raise self.empty()
 
+        # Backwards: of several values for one place NumPy keeps the last, here the first candidate.
         best = np.flatnonzero(gain >= most[owner] - ROUNDING * self.scale)[::-1]
         nearest = np.empty_like(p)
-        nearest[owner[best]] = c[best]  # of equal owners the last is kept, in order the first
+        nearest[owner[best]] = c[best]
 
         return to_hip(self.leg, nearest)
 
@@ -144,7 +146,7 @@ class Extended(NamedTuple):
         return [to_hip(self.leg, piece) for piece in pieces]
 
     def _arcs(self, circle: Circle) -> list[tuple[float, float]]:
-        """Return the directions of F at which E reaches the C of a circle."""
+        """Return the directions of F on a circle at which E reaches C."""
         low, high = _reach(self.leg)
         turn = float(np.angle(circle.C))
         return [(a - turn, b - turn) for a, b in spans(abs(circle.C), self.leg.L5, low, high)]
@@ -171,12 +173,13 @@ def to_hip(leg: FiveBar, z: Complex) -> Array:
 
 
 def _reach(leg: FiveBar) -> tuple[float, float]:
-    """Return the radii of E's reach [m]; 0 inside for a hole within rounding."""
+    """Return the radii of E's reach [m]; the inner one is 0 if it is mere rounding."""
     inner = abs(leg.L4 - leg.L3)
     outer = leg.L4 + leg.L3
     return (inner if inner**2 > ROUNDING * outer**2 else 0.0), outer
 
 
+# Cached: a leg is asked again and again, and its coupler curves are the same each time.
 @lru_cache(maxsize=32)
 def region(leg: FiveBar, elbow: int) -> Extended:
     """Return the workspace of a leg with L6 > 0.
@@ -211,7 +214,7 @@ def region(leg: FiveBar, elbow: int) -> Extended:
 def _curves(leg: FiveBar, elbow: int, bar: FourBar, low: float, high: float) -> Curves:
     """Return the parts of the coupler curves on the boundary, those of the inner rocker first.
 
-    They are those where one of these functions of the pose is at least 0.
+    On them at least one of the functions of the pose below is 0 or above.
     """
     slack = SAME * leg.size
 
@@ -241,10 +244,10 @@ def _curves(leg: FiveBar, elbow: int, bar: FourBar, low: float, high: float) -> 
 
 
 def _rockers(leg: FiveBar, low: float, high: float) -> list[float]:
-    """Return the radii of E's reach that C can pass: that side A does not keep it from.
+    """Return the radii of E's reach that C can cross, as far as side A lets it.
 
-    C is between c_low and c_high from A. With the circle at the very edge of that there may be
-    poses on it, but none beyond it.
+    C is between c_low and c_high from A. A circle at the very edge of that may have poses on it,
+    but none beyond.
     """
     slack = ROUNDING * leg.size
     c_low = abs(leg.L1 - leg.L2)
@@ -263,7 +266,7 @@ def _candidates(region: Extended, p: Complex) -> tuple[Rows, Complex, Complex]:
     Returns:
         owner: Which p a candidate is for, (m,).
         c: The candidate, (m,): on the circles, inner first; on the curves; then the nearest poses.
-        b: For each p any candidate, or 0 if none is known, (n,).
+        b: For each p one of its candidates, or 0 if none is known, (n,).
     """
     every = np.arange(len(p))
     owner = []

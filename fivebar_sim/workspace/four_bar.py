@@ -46,7 +46,7 @@ class FourBar(NamedTuple):
 
     @property
     def scale(self) -> float:
-        """What tolerances are relative to [m]."""
+        """Length to which tolerances are relative [m]."""
         return self.crank + max(self.coupler, abs(self.offset))
 
     def joints(self, q: Array) -> tuple[Complex, Complex, Complex]:
@@ -64,11 +64,12 @@ class FourBar(NamedTuple):
         return gap, np.stack([self.base * C.imag, -(np.conj(r) * (C - B)).imag], axis=-1)
 
     def between(self, q: Array, dq: Array, s: Array) -> Array:
-        """Return the poses of the curve at parts s of the chords from q to q + dq."""
+        """Return the poses of the curve at fractions s of the chords from q to q + dq."""
         rounding = np.finfo(float).eps * self.scale**2
         q = q + s[..., None] * dq
 
-        for _ in range(3):  # each squares the relative gap, first 1e-3
+        # Newton squares the relative gap, at first 1e-3: three steps reach rounding.
+        for _ in range(3):
             gap, slope = self.gradient(q)
             square = _norm2(slope)
             # A pose that is on the curve to rounding stays: a step there would only add noise.
@@ -79,7 +80,7 @@ class FourBar(NamedTuple):
         return q
 
     def velocity(self, q: Array, dq: Array) -> Complex:
-        """Return dF of one radian along the curve, in the sense of the chord dq, [m], (...)."""
+        """Return dF per radian along the curve, in the direction of the chord dq [m], (...)."""
         _, slope = self.gradient(q)
         tangent = np.stack([-slope[..., 1], slope[..., 0]], axis=-1)
         # At a double point dG/dq is 0 and has no direction: the chord stands in for it.
@@ -98,6 +99,7 @@ class FourBar(NamedTuple):
         image. Where F is on the origin the image is C itself.
         """
         w = self.crank + self.offset * np.exp(1j * q[..., 1])
+        # w / conj(w) = e^(2 i arg w), without an angle that wraps.
         spin = np.where(w == 0.0, 1.0, w) / np.conj(np.where(w == 0.0, 1.0, w))
         mirrored = np.conj(self.offset) * np.exp(-1j * q[..., 1]) / self.offset
         return np.exp(1j * q[..., 0]) * spin * (self.crank + self.coupler * mirrored)

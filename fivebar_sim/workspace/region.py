@@ -1,10 +1,10 @@
-"""The workspace: whether the foot reaches a point, the nearest point it reaches, and how far.
+"""The workspace: whether the foot reaches a point, the nearest reachable point, the distance to it.
 
-Where L6 = 0 it is what two rings have in common, and all answers are exact to rounding (`rings`).
+Where L6 = 0 it is the intersection of two rings, and all answers are exact to rounding (`rings`).
 Where L6 > 0 it is bounded by circles about A and by coupler curves, whose nearest points are found
-by iteration (`extended`): to 1e-12 of the leg's size. What could be missed is a second minimum of
-the distance within one step of a curve's sampling, 0.04 rad: it is less than 1e-5 of that step
-nearer. Either way the answer is one that `kinematics.inverse_all` takes.
+by iteration (`extended`): to 1e-12 of the leg's size. A second minimum of the distance within one
+step of a curve's samples, 0.04 rad, could be missed: it would be nearer by less than 1e-5 of that
+step. Either way `kinematics.inverse_all` accepts the answer.
 """
 
 from __future__ import annotations
@@ -37,19 +37,20 @@ def reachable(
     Args:
         leg: The leg.
         foot: F [m], hip frame, (..., 2). NaN and infinity are not reachable.
-        margin: How far from the boundary the foot shall stay at least [m].
-        mode: Working mode in which it shall be reached; None is any. All reach the same where
-            L6 = 0; else s_A alone decides.
+        margin: Least distance that the foot must keep from the boundary [m].
+        mode: Working mode that must reach the foot; None for any. With L6 = 0 all modes reach the
+            same; else s_A alone decides.
 
     Returns:
-        Truth values, (...): with a margin, where `distance` is at least that.
+        Truth values, (...): with a margin, where `distance` is at least the margin.
 
     Raises:
         ArgumentError: A shape other than (..., 2), an unknown mode, or unless margin >= 0.
     """
     _check(margin, mode)
     foot = as_pairs(foot, "foot")
-    with np.errstate(over="ignore", invalid="ignore"):  # a square of 1e200 m is as far as inf
+    # The square of 1e200 m overflows to inf, which is just as far out of reach.
+    with np.errstate(over="ignore", invalid="ignore"):
         held = np.asarray(_region(leg, margin if leg.L6 == 0.0 else 0.0, mode).holds(foot))
     # Rings shrink by a margin exactly; coupler curves do not, so distances are measured.
     if margin > 0.0 and leg.L6 > 0.0 and held.any():
@@ -62,19 +63,20 @@ def nearest(
 ) -> Array:
     """Return the nearest points that the foot can reach.
 
-    A reachable point is returned as it is. Any other goes to the nearest point of the boundary,
-    and from there by units in the last place to where `reachable`, and so `kinematics.inverse_all`,
-    accepts it. (Where L6 > 0, in a single mode, and with A, B and F in line, that may take up to
-    2e-7 of the leg's size: C moves with the square root of F's rounding.) Of points equally near
-    (to rounding) the first is taken: in the order of `rings` where L6 = 0; else in that of
-    `boundary`. A point on a motor axis has no ray from it: there the ray points away from the other
-    motor; if the motors are coaxial, to -z where L6 = 0, else against the tilt.
+    A reachable point is returned as it is. Any other is replaced by the nearest point of the
+    boundary, moved by units in the last place to where `reachable`, and so
+    `kinematics.inverse_all`, accepts it. (With L6 > 0, in a single mode, and with A, B and F in
+    line, that may take up to 2e-7 of the leg's size: C moves with the square root of F's rounding.)
+    Of points that are equally near, to rounding, the first is taken: in the order of `rings` with
+    L6 = 0, else in that of `boundary`. For a point on a motor's axis, where the direction is
+    undefined, it is away from the other motor; with coaxial motors -z if L6 = 0, else against the
+    tilt.
 
     Args:
         leg: The leg.
         foot: F [m], hip frame, (..., 2).
-        margin: How far from the boundary the answer shall be at least [m]; only where L6 = 0.
-        mode: Working mode in which the answer shall be reached; None is any.
+        margin: Least distance that the answer must keep from the boundary [m]; only with L6 = 0.
+        mode: Working mode that must reach the answer; None for any.
 
     Returns:
         The nearest reachable points [m], (..., 2).
@@ -109,7 +111,7 @@ def distance(leg: FiveBar, foot: ArrayLike, *, mode: Mode | None = None) -> Arra
     Args:
         leg: The leg.
         foot: F [m], hip frame, (..., 2).
-        mode: Working mode whose workspace is meant; None is all together.
+        mode: Working mode whose workspace is meant; None for that of all modes together.
 
     Returns:
         Signed distances [m], (...): at least 0 where `reachable`.
@@ -131,13 +133,13 @@ def distance(leg: FiveBar, foot: ArrayLike, *, mode: Mode | None = None) -> Arra
 def boundary(leg: FiveBar, *, mode: Mode | None = None) -> list[Array]:
     """Return the boundary of the workspace as polylines for drawing.
 
-    First the arcs of A's circles, inner first; then those of E's where L6 = 0, or the coupler
-    curves of C on E's inner circle and on its outer where L6 > 0. Where pieces meet they share an
-    end, to rounding.
+    First the arcs of A's circles, inner first; then with L6 = 0 those of E's circles, or with
+    L6 > 0 the coupler curves of C on E's inner circle and on its outer one. Where pieces meet they
+    share an end, to rounding.
 
     Args:
         leg: The leg.
-        mode: Working mode whose workspace is meant; None is all together.
+        mode: Working mode whose workspace is meant; None for that of all modes together.
 
     Returns:
         Polylines [m], each (n, 2), n at least 2. Their points are on the boundary; neighbours are
@@ -159,11 +161,11 @@ def singular_curves(leg: FiveBar, mode: Mode | None = None) -> list[Array]:
 
     Args:
         leg: The leg.
-        mode: Working mode (s_A, s_E) whose poses are meant; None is the leg's own.
+        mode: Working mode (s_A, s_E) whose poses are meant; None for the leg's own.
 
     Returns:
-        Polylines [m], each (n, 2), ending where a side chain is straight or folded. None where
-        every pose of the mode is singular: coaxial legs with L1 = L4 and L2 = L3, if s_A = s_E.
+        Polylines [m], each (n, 2), ending where a side chain is straight or folded. Empty if every
+        pose of the mode is singular: coaxial legs with L1 = L4 and L2 = L3, if s_A = s_E.
 
     Raises:
         ArgumentError: Unknown mode.
@@ -199,7 +201,7 @@ def _finite(foot: ArrayLike) -> Array:
 def _by_blocks(
     solve: Callable[[Array], Array], foot: Array, item: tuple[int, ...], size: int
 ) -> Array:
-    """Return what solve gives for flat blocks of points, as foot's batch of items."""
+    """Return the answers of solve, found block by block, in the batch shape of foot."""
     flat = foot.reshape(-1, 2)
     out = np.empty((len(flat), *item))
     for start in range(0, len(flat), size):
@@ -209,19 +211,17 @@ def _by_blocks(
 
 
 def _settle(whole: Rings | Extended, points: Array) -> Array:
-    """Return boundary points moved to the first floating-point neighbours that are reachable.
-
-    A boundary point is off by some units in the last place of the region's largest radius, which
-    may be more than the slack of the shortest link's comparison.
-    """
+    """Return boundary points moved to the first floating-point neighbours that are reachable."""
     points = points.copy()
+    # A boundary point is off by some units in the last place of the region's largest radius, which
+    # may be more than the slack in the comparison for the shortest link.
     lost = np.flatnonzero(~whole.holds(points))
-    for move in whole.moves():
+    for step in whole.nudges():
         if not lost.size:
             break
-        moved = whole.moved(points[lost], *move)
-        ok = whole.holds(moved)
-        points[lost[ok]] = moved[ok]
+        tried = whole.nudge(points[lost], *step)
+        ok = whole.holds(tried)
+        points[lost[ok]] = tried[ok]
         lost = lost[~ok]
 
     if lost.size:

@@ -1,6 +1,6 @@
 """The workspace of a leg without an extension: its boundary, and the nearest point of that.
 
-The foot F is C, and the workspace is what two rings have in common:
+The foot F is C, and the workspace is the intersection of two rings:
 
     |L1 - L2| <= |AF| <= L1 + L2   and   |L4 - L3| <= |EF| <= L4 + L3
 
@@ -12,12 +12,12 @@ A with one about E. So the boundary point nearest to p is one of a few candidate
     3. crossings of A's inner circle with E's inner, E's outer; of A's outer with the same;
        of each pair first the crossing to the right of A -> E, where a leg hangs
 
-A margin m leaves those points whose circle of radius m lies in the workspace. It is again what two
-rings have in common, and exactly so: a circle fits in both rings if it fits in each.
+A margin m leaves those points whose circle of radius m lies in the workspace. That is again the
+intersection of two rings, and exactly so: a circle fits in both rings if it fits in each.
 
     |L1 - L2| + m <= |AF| <= L1 + L2 - m   and   |L4 - L3| + m <= |EF| <= L4 + L3 - m
 
-A ring without a hole, near = far, keeps none.
+A ring without a hole, near = far, does not get one.
 """
 
 from __future__ import annotations
@@ -38,13 +38,13 @@ from fivebar_sim.workspace.coupler import spans
 
 
 class Ring(NamedTuple):
-    """Where one side chain reaches.
+    """The points that one side chain reaches.
 
     Attributes:
         centre: Common centre of the two circles [m], (2,).
         near: Link at the motor [m].
         far: Link beyond the knee [m].
-        away: Direction taken for points on the centre: away from the other motor; down if coaxial.
+        away: Direction for points on the centre: away from the other motor; down if coaxial.
     """
 
     centre: Array
@@ -54,9 +54,10 @@ class Ring(NamedTuple):
 
     @property
     def radii(self) -> tuple[float, ...]:
-        """Radii of the circles [m], inner first; without a hole that is mere rounding."""
+        """Radii of the circles [m], inner first; a hole that is mere rounding is left out."""
         inner = abs(self.near - self.far)
         outer = self.near + self.far
+        # Squares, as in `reaches`: both must call the same hole rounding.
         return (inner, outer) if inner**2 > ROUNDING * outer**2 else (outer,)
 
     @property
@@ -65,14 +66,16 @@ class Ring(NamedTuple):
         return self.radii[0] if len(self.radii) == 2 else 0.0
 
     def holds(self, points: Array) -> Bools:
-        """Return where the chain reaches, by the very comparison of `kinematics.inverse`."""
+        """Return where the chain reaches."""
+        # By the very comparison of `kinematics.inverse`, so that the two never disagree.
         r = points - self.centre
         return reaches(dot(r, r), self.near, self.far)
 
-    def shrunk(self, margin: float) -> Ring:
-        """Return the ring of the points that are at least margin [m] inside, as one of two links.
+    def shrink(self, margin: float) -> Ring:
+        """Return the ring of the points that are at least margin [m] inside.
 
-        The sum of the links is less by the margin; their difference, if there is a hole, is more.
+        It is again a ring of two links: their sum is less by the margin, and their difference, if
+        there is a hole, more by it.
         """
         long = max(self.near, self.far)
         short = min(self.near, self.far)
@@ -88,7 +91,7 @@ class Rings(NamedTuple):
         leg: The leg.
         left: The ring about A.
         right: The ring about E.
-        margin: How much the rings are shrunk [m].
+        margin: By how much the rings are shrunk [m].
     """
 
     leg: FiveBar
@@ -115,13 +118,13 @@ class Rings(NamedTuple):
         """Whether the margin is more than half of a ring's width."""
         return min(self.left.far, self.right.far) < 0.0
 
-    def moves(self) -> Iterator[tuple[float, float]]:
+    def nudges(self) -> Iterator[tuple[float, float]]:
         """Yield how far to move a lost boundary point [m], by up to 8 units in the last place."""
         ulp = float(np.spacing(self.scale))
         for step, x, z in product((0.25, 0.5, 1.0, 2.0, 4.0, 8.0), (0, -1, 1), (0, -1, 1)):
             yield step * ulp * x, step * ulp * z
 
-    def moved(self, points: Array, x: float, z: float) -> Array:
+    def nudge(self, points: Array, x: float, z: float) -> Array:
         """Return points moved along x and z [m]."""
         return points + np.array([x, z])
 
@@ -132,7 +135,7 @@ class Rings(NamedTuple):
 
             |p - b|^2 - |p - c|^2 = (c - b) . (2 p - b - c)
 
-        which keeps its digits where both are nearly equally far, and where p is far away.
+        which loses no digits where both are nearly equally far, or where p is far away.
         """
         if self._void:
             raise self.empty()
@@ -178,7 +181,7 @@ class Rings(NamedTuple):
         )
 
     def _candidates(self, p: Array) -> Iterator[tuple[Array, Bools]]:
-        """Yield the candidates for the nearest point, (n, 2) or (2,), and which are boundary."""
+        """Yield candidates for the nearest point, (n, 2) or (2,), and which are on the boundary."""
         for ring, other in ((self.left, self.right), (self.right, self.left)):
             r = p - ring.centre
             length = _norm(r)[:, None]
@@ -201,19 +204,19 @@ def rings(leg: FiveBar, margin: float = 0.0) -> Rings:
     left = Ring(A, leg.L1, leg.L2, away_A)
     right = Ring(E, leg.L4, leg.L3, away_E)
     if margin > 0.0:
-        left = left.shrunk(margin)
-        right = right.shrunk(margin)
+        left = left.shrink(margin)
+        right = right.shrink(margin)
     return Rings(leg, left, right, margin)
 
 
 def _corners(left: Ring, right: Ring) -> Iterator[Array]:
-    """Yield the crossings of A's circles with E's; one that misses by rounding counts.
+    """Yield the crossings of A's circles with E's; a miss by rounding counts as a crossing.
 
     With d = |AE|, u the unit vector along AE, and n = u turned by +90 deg:
 
         c = A + a u -+ h n,   a = d / 2 + (r_A + r_E) (r_A - r_E) / 2d,   h = sqrt(r_A^2 - a^2)
 
-    where, with t = r_A + r_E and g = r_A - r_E, nothing is lost near h = 0 in
+    where, with t = r_A + r_E and g = r_A - r_E, no digits are lost near h = 0 in
 
         h = sqrt((t - d) (t + d) (d - g) (d + g)) / 2d
     """
@@ -228,8 +231,9 @@ def _corners(left: Ring, right: Ring) -> Iterator[Array]:
                 continue
             a = 0.5 * d + t * g / (2.0 * d)
             h = max((t - d) * (t + d) * (d - g) * (d + g), 0.0) ** 0.5 / (2.0 * d)
+            # Concentric but for rounding: the formula divides by a d of mere rounding.
             if abs(np.hypot(a, h) - r_A) > rounding or abs(np.hypot(d - a, h) - r_E) > rounding:
-                continue  # concentric circles but for rounding
+                continue
             u = AE / d
             for side in (-1.0, 1.0):
                 yield left.centre + a * u + side * h * perp(u)

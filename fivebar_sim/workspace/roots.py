@@ -1,4 +1,4 @@
-"""Where many functions on [0, 1] at once are zero or least."""
+"""Zeros and minima of many functions on [0, 1] at once."""
 
 from __future__ import annotations
 
@@ -9,16 +9,16 @@ import numpy as np
 from fivebar_sim.arrays import Array
 
 STEPS = 60
-"""Steps at most of `crossing`: enough to halve an interval to a float's last place."""
+"""Most steps of `crossing`: enough to halve an interval to a float's last place."""
 
 
 def crossing(f: Callable[[Array], Array], f_0: Array, f_1: Array) -> Array:
     """Return where functions that change their sign in [0, 1] are zero, by the Illinois rule.
 
     Args:
-        f: Values at (n,) places, of function 1 to n.
-        f_0: Values at 0.
-        f_1: Values at 1.
+        f: Returns the value of each of n functions at its own place, (n,) to (n,).
+        f_0: Values at 0, (n,).
+        f_1: Values at 1, (n,).
     """
     a = np.zeros(len(f_0))
     b = np.ones(len(f_0))
@@ -43,11 +43,12 @@ def crossing(f: Callable[[Array], Array], f_0: Array, f_1: Array) -> Array:
 
 
 def lowest(f: Callable[[Array], Array], count: int) -> Array:
-    """Return where in [0, 1] functions 1 to n with one minimum each are least: golden section."""
+    """Return where in [0, 1] each of `count` functions has its one minimum: golden section."""
     golden = 0.5 * (5.0**0.5 - 1.0)
     a = np.zeros(count)
     b = np.ones(count)
-    for _ in range(40):  # to 4e-9: the value to rounding
+    # To 4e-9 of the interval: a minimum is flat, so its value is then exact to rounding.
+    for _ in range(40):
         c = b - golden * (b - a)
         d = a + golden * (b - a)
         left = f(c) < f(d)

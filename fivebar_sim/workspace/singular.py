@@ -1,4 +1,4 @@
-"""Where B, C and D are in line, as coupler curves of the foot."""
+"""The foot positions at which B, C and D are in line, as coupler curves."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from fivebar_sim.workspace.four_bar import Complex, FourBar
 
 
 def singular_pieces(leg: FiveBar, mode: Mode) -> list[Complex]:
-    """Return F of a working mode's poses with B, C and D in line, or B = D.
+    """Return the foot positions of a working mode's poses with B, C and D in line, or B = D.
 
     With L2 and L3 stretched or folded, A, B, D, E is a four-bar that carries the foot.
 
@@ -23,7 +23,8 @@ def singular_pieces(leg: FiveBar, mode: Mode) -> list[Complex]:
 
 def _pieces(leg: FiveBar, mode: Mode, sign: float) -> list[Complex]:
     """Return the pieces of L2 and L3 stretched (sign +1) or folded (-1)."""
-    reach = leg.L2 + sign * leg.L3  # D from B along BC
+    # D from B along BC; a four-bar's coupler is positive, so a negative one is turned round.
+    reach = leg.L2 + sign * leg.L3
     flip = -1.0 if reach < 0.0 else 1.0
     bar = FourBar(leg.L1, abs(reach), leg.L4, leg.L5, flip * complex(*leg.foot_offset))
     s_A, s_E = mode

@@ -1,4 +1,4 @@
-"""The workspace on a grid: how far each foot position is from its edge."""
+"""The workspace on a grid: the distance of each foot position from its edge."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ CELLS = 241
 
 
 class Map(NamedTuple):
-    """How deep the workspace is, on a grid of foot positions; matrices are indexed [z, x].
+    """Distances from the workspace's edge on a grid of foot positions, indexed [z, x].
 
     Attributes:
-        x: [m], hip frame, (m,).
-        z: [m], (n,).
-        distance: Signed distance to the edge of what the leg's working mode reaches [m], (n, m).
+        x: Grid positions along x [m], hip frame, (m,).
+        z: Grid positions along z [m], (n,).
+        distance: Signed distance to the edge of the leg's own working mode's reach [m], (n, m).
     """
 
     x: Array
@@ -31,7 +31,7 @@ class Map(NamedTuple):
 
     @property
     def area(self) -> float:
-        """Area of the reachable region [m^2], to a grid cell along its boundary."""
+        """Area of the reachable region [m^2], to within a grid cell along its boundary."""
         cell = float((self.x[1] - self.x[0]) * (self.z[1] - self.z[0]))
         return cell * float((self.distance >= 0.0).sum())
 
@@ -56,7 +56,7 @@ def survey(leg: FiveBar, cells: int = CELLS) -> Map:
 
 
 def _span(found: ArrayLike) -> slice:
-    """Return the part from a margin before the first found to one behind the last."""
+    """Return the slice from a margin before the first true value to a margin after the last."""
     where = np.flatnonzero(found)
     if not len(where):
         return slice(None)
