@@ -1,1 +1,1 @@
-"""What a leg is like: singularities, quality, aspects, what a path comes close to."""
+"""Analysis of a leg: singularities, quality, aspects, and what a path comes close to."""

@@ -1,24 +1,25 @@
 """Aspects: the connected regions of poses between the singularities.
 
 Inside an aspect no distance of `singularity.Distances` changes its sign: (s_A, s_E, assembly) is
-one triple throughout. But a triple may belong to several aspects, as where the workspace is in two
-parts, so connectedness is looked for in an atlas of the poses (theta_A, psi_2, theta_E, psi_3), the
-directions of L1..L4. Each of its three charts is a grid over all of two angles, in two sheets:
+the same triple throughout. But one triple may have several aspects, for instance if the workspace
+has two parts, so connected regions are searched for in an atlas of the poses (theta_A, psi_2,
+theta_E, psi_3), the directions of L1..L4. Each of its three charts is a grid over all of two
+angles, in two sheets:
 
     theta_A, theta_E    sheet: sign(BD x BC)    folds where B, C, D are in line
     theta_A, psi_2      sheet: sign(EC x ED)    folds where E, D, C are in line
     theta_E, psi_3      sheet: sign(AC x AB)    folds where A, B, C are in line
 
-Near its fold a chart's nodes are far apart in the two other angles; another chart is even there.
+Near its fold a chart's nodes are far apart in the two other angles; another chart is dense there.
 Two poses of one triple are linked if one is a corner of the other's cell, in the same chart or in
 another. The resolution is thus 2 pi / cells in the chart's two angles:
 
     a neck thinner than a cell may separate what is connected;
-    a gap or a strip of another triple between two nodes may be leapt over;
+    a gap or a strip of another triple between two nodes may be skipped;
     a region of fewer than `FEW` nodes gets no number.
 
-A finer grid settles a doubt. Of 60 random legs 54 had as many aspects on grids of 3 and of 1.5 deg;
-each of the others had one region more or less, of under 60 nodes of 1.5 deg.
+If in doubt, use a finer grid. Of 60 random legs 54 had the same number of aspects on grids of 3 and
+of 1.5 deg; each of the others had one region more or less, of under 60 nodes of 1.5 deg.
 
 See: Chablat and Wenger 1998, "Working modes and aspects in fully parallel manipulators", IEEE ICRA
 (arXiv 0707.2006), for the notion.
@@ -43,24 +44,24 @@ from fivebar_sim.kinematics.reach import inverse, points_at, side_angle
 Ints = NDArray[np.int_]
 
 CELLS = 120
-"""Cells of a grid along each angle: of 3 deg."""
+"""Cells of a grid along each angle: 3 deg each."""
 
 FEW = 12
-"""Nodes below which a part is taken for a sliver that the grid has torn off: it gets number 0. On
-random legs torn slivers had up to 12 nodes of 3 deg, and dissolve on a finer grid."""
+"""A part of fewer nodes is taken for a sliver that the grid has torn off: it gets number 0. On
+random legs torn slivers had up to 12 nodes of 3 deg, and they vanished on a finer grid."""
 
 CHARTS = ((0, 2), (0, 1), (2, 3))
-"""Which two of the four angles each chart is a grid over."""
+"""The two of the four angles over which each chart is a grid."""
 
 
 class Aspect(NamedTuple):
     """The aspects of poses, each (...); two poses share one if all four agree, part not 0.
 
     Attributes:
-        s_A: Sign.
-        s_E: Sign.
-        assembly: Sign.
-        part: Number of the aspect among those of the triple, from 1, the one of most nodes first;
+        s_A: Working mode of side A, -1 or +1.
+        s_E: Working mode of side E.
+        assembly: Assembly mode.
+        part: Number of the aspect among those of the triple, from 1 for the one with most nodes;
             0 where the grid is too coarse to tell.
     """
 
@@ -76,7 +77,7 @@ class _Atlas(NamedTuple):
     Attributes:
         q: Directions (theta_A, psi_2, theta_E, psi_3) [rad], (6 n^2, 4).
         triple: Signs, with zeros where there is no pose or a singular one, (6 n^2, 3).
-        part: Number of the aspect, 0 where a sign is 0 or the part is of few nodes, (6 n^2,).
+        part: Number of the aspect, 0 where a sign is 0 or the part has few nodes, (6 n^2,).
     """
 
     q: Array
@@ -128,8 +129,8 @@ def same_aspect(
 ) -> Bools:
     """Return where the foot gets from p to q in one working mode without meeting a singularity.
 
-    True: a chain of poses of one triple was found, each linked to the next. False: none was, which
-    proves nothing where a neck may be thinner than a cell.
+    True: a chain of poses of one triple was found, each linked to the next. False: no such chain
+    was found, which proves nothing if a neck may be thinner than a cell.
 
     Args:
         leg: The leg.
@@ -154,7 +155,7 @@ def same_aspect(
 
 
 def all_aspects(leg: FiveBar, *, cells: int = CELLS) -> Aspect:
-    """Return the aspects of a leg that the grids hold, each once, all modes, shape (n,).
+    """Return all aspects of a leg that the grids show, of all modes, each once, shape (n,).
 
     Raises:
         ArgumentError: Unless cells is a whole number above 2.
@@ -193,12 +194,13 @@ def _aspect(leg: FiveBar, points: Points, cells: int) -> Aspect:
 def _atlas(leg: FiveBar, cells: int) -> _Atlas:
     if isinstance(cells, bool) or not isinstance(cells, int) or cells < 3:
         raise ArgumentError(f"cells must be a whole number above 2, got {cells!r}")
-    return _drawn(leg, cells)
+    return _draw_atlas(leg, cells)
 
 
+# Cached: a leg is asked again and again, and its atlas is the same each time.
 @lru_cache(maxsize=8)
-def _drawn(leg: FiveBar, cells: int) -> _Atlas:
-    """Return the atlas of a leg; the last few are kept, since a leg is asked again and again."""
+def _draw_atlas(leg: FiveBar, cells: int) -> _Atlas:
+    """Return the atlas of a leg."""
     charts = [_chart(leg, chart, s, cells) for chart in range(3) for s in (-1, 1)]
     q = np.concatenate([each for each, _ in charts])
     closed = np.concatenate([ok for _, ok in charts])
@@ -219,7 +221,7 @@ def _drawn(leg: FiveBar, cells: int) -> _Atlas:
 
 
 def _chart(leg: FiveBar, chart: int, s: int, cells: int) -> tuple[Array, Bools]:
-    """Return the directions (n^2, 4) of one sheet's nodes, and where there is a pose, (n^2,)."""
+    """Return the directions (n^2, 4) of one sheet's nodes, and where the loop closes, (n^2,)."""
     angle = 2.0 * np.pi / cells * (np.arange(cells, dtype=np.float64) + 0.5) - np.pi
     first = np.repeat(angle, cells)
     second = np.tile(angle, cells)
@@ -257,7 +259,7 @@ def _directions(leg: FiveBar, p: Points) -> Array:
 
 
 def _sheets(leg: FiveBar, p: Points) -> Ints:
-    """Return on which sheet, 0 or 1, poses are in each chart, (..., 3)."""
+    """Return the sheet, 0 or 1, on which poses are in each chart, (..., 3)."""
     A, E = bases(leg)
     C = p.C_left
     of = (cross(p.D - p.B, C - p.B), cross(C - E, p.D - E), cross(C - A, p.B - A))
@@ -272,7 +274,8 @@ def _corners(q: Array, sheet: Ints, cells: int) -> Ints:
     for k, (i, j) in enumerate(CHARTS):
         grid = 2 * k + sheet[..., k]
         for up, right in np.ndindex(2, 2):
-            row = (low[..., i] + up) % cells  # the grid closes after a turn
+            # The grid closes after a turn.
+            row = (low[..., i] + up) % cells
             column = (low[..., j] + right) % cells
             flat.append((grid * cells + row) * cells + column)
 
@@ -282,8 +285,8 @@ def _corners(q: Array, sheet: Ints, cells: int) -> Ints:
 def _roots(count: int, one: Ints, other: Ints) -> Ints:
     """Return the least node of each node's connected part, (count,).
 
-    Each node starts as its own root. Along every link the greater root is hung onto the lesser one,
-    and paths are shortened to their roots, until both ends of all links have one root.
+    Each node starts as its own root. Along every link the greater root is attached to the lesser,
+    and paths are shortened to their roots, until both ends of every link have the same root.
     """
     root = np.arange(count)
     while len(one):
@@ -300,7 +303,7 @@ def _roots(count: int, one: Ints, other: Ints) -> Ints:
 
 
 def _number_parts(triple: Ints, root: Ints) -> Ints:
-    """Return each node's part: 1 for the part of most nodes among those of one triple, 0 if few."""
+    """Return each node's part among those of its triple: 1 for the largest, 0 for a sliver."""
     part = np.zeros(len(root), dtype=int)
     for signs_of_part in np.unique(triple[triple.any(axis=-1)], axis=0):
         here = np.flatnonzero((triple == signs_of_part).all(axis=-1))

@@ -1,8 +1,8 @@
 """Foot paths: the motor angles that follow one without a jump, and the singularities it meets.
 
-Neither looks between the points of a path: what happens there shows only as a change of sign of a
-distance, or as a step of the angles. Sample a path so finely that a step is small against the
-distances (`singularity.Distances`) it passes.
+Only the points of a path are looked at: what happens between them shows as a change of sign of a
+distance, or as a step of the angles. Sample a path so finely that a step is small compared to the
+distances (`singularity.Distances`) that it passes.
 """
 
 from __future__ import annotations
@@ -47,11 +47,11 @@ class Closest(NamedTuple):
 
     Attributes:
         distance: The distance nearest to zero of all points, with its sign [m].
-        time: When it is reached [s].
-        point: At which point of the path, counted from 0.
-        crossing: When the path first meets the singularity [s]; inf if it never does. It is met
-            at a point that is singular to rounding (sine at most `singularity.EDGE`), and between
-            two of opposite signs of the distance, at t_1 + (t_2 - t_1) d_1 / (d_1 - d_2).
+        time: When the path reaches it [s].
+        point: Index of that point of the path.
+        crossing: When the path first meets the singularity [s]; inf if it never does. It is met at
+            a point that is singular to rounding (sine at most `singularity.EDGE`), and between two
+            points with distances of opposite signs, at t_1 + (t_2 - t_1) d_1 / (d_1 - d_2).
     """
 
     distance: float
@@ -61,11 +61,11 @@ class Closest(NamedTuple):
 
 
 class PathReport(NamedTuple):
-    """What a foot path meets: the closest of each kind, and the distances at all points (N,).
+    """How near a foot path comes to each kind of singularity, and all distances, each (N,).
 
-    A side is met where the foot touches the edge of its reach, where the two working modes of the
-    side are one: only there can it be changed. Where `loop` is met, a leg that keeps its working
-    mode is forced through an infinite J into the other assembly mode.
+    A side's singularity is met where the foot touches the edge of the side's reach. There its two
+    working modes are one, so only there can the mode change. Where `loop` is met, a leg that keeps
+    its working mode is forced through an infinite J into the other assembly mode.
     """
 
     side_A: Closest
@@ -77,12 +77,12 @@ class PathReport(NamedTuple):
 def follow(
     leg: FiveBar, foot: ArrayLike, theta0: ArrayLike, *, step_max: float = STEP_MAX
 ) -> Followed:
-    """Return angles along a foot path: at each point, of four solutions, the nearest to the last.
+    """Return angles along a foot path: at each point the solution, of four, nearest to the last.
 
-    Nearest as in `kinematics.inverse_nearest`: least sum of squares of the wrapped differences. Of
-    solutions equally near the working mode at hand is kept. A path that touches the edge of reach
-    may leave it in another mode; so may one that passes it within a step: then `changed` is not
-    empty though no `crossing` is reported, and the points are too few.
+    Nearest as in `kinematics.inverse_nearest`: least sum of squares of the wrapped differences. If
+    solutions are equally near, the current working mode is kept. A path that touches the edge of
+    reach may leave it in another mode; so may one that passes the edge within a step: then
+    `changed` is not empty though no `crossing` is reported, and the points are too few.
 
     Args:
         leg: The leg.
@@ -95,8 +95,8 @@ def follow(
         The angles, the working modes, and where they change.
 
     Raises:
-        UnreachableError: Where no solution is, or none within step_max of the last, so that no
-            continuous motion follows the path; `.index` is the first such point.
+        UnreachableError: Where there is no solution, or none within step_max of the last, so that
+            no continuous motion follows the path; `.index` is the first such point.
         ArgumentError: A wrong shape, theta0 not finite, or unless step_max > 0.
     """
     path = _path(foot)
@@ -155,19 +155,21 @@ def path_report(
 
 
 def _nearest_rows(first: Array, every: Array) -> list[int]:
-    """Return which row of every (N, 4, 2) is nearest to the row taken before it, point by point.
+    """Return which of four solutions (N, 4, 2) is nearest to the one chosen before, point by point.
 
-    The best next row is found for all four rows at once; the chain of choices is then a walk
+    The best next solution is found for all four at once; the chain of choices is then a walk
     through a table.
     """
     # Costs between all modes of neighbouring points at once; only the walk is a loop.
     before = np.concatenate([np.broadcast_to(first, (1, 4, 2)), every[:-1]])
     cost = np.sum(wrap(every[:, None, :, :] - before[:, :, None, :]) ** 2, axis=-1)
-    cost = np.where(np.isnan(cost), np.inf, cost)  # (point, row before, row)
+    # Indices are (point, row before, row).
+    cost = np.where(np.isnan(cost), np.inf, cost)
     same = np.arange(4)
     keep = cost[:, same, same] <= cost.min(axis=-1) + TIE
     table = np.where(keep, same, np.argmin(cost, axis=-1))
-    table[0] = np.argmin(cost[0, 0])  # no row is before the first
+    # No mode is kept at the first point: there is no row before it.
+    table[0] = np.argmin(cost[0, 0])
     rows = [0]
     for to in table.tolist():
         rows.append(to[rows[-1]])
@@ -175,11 +177,11 @@ def _nearest_rows(first: Array, every: Array) -> list[int]:
 
 
 def _closest(distance: Array, zero: float, time: Array) -> Closest:
-    """Return the nearest and the first meeting of a distance (N,); at most `zero` [m] is met."""
+    """Return how near distances (N,) come to zero, and when first; at most `zero` [m] is zero."""
     i = int(np.argmin(np.abs(distance)))
     d_1 = distance[:-1]
     d_2 = distance[1:]
-    # Linear between two points: no more is known there.
+    # Linear between two points, where nothing else is known.
     k = np.flatnonzero(np.sign(d_1) * np.sign(d_2) < 0.0)
     between = time[k] + np.diff(time)[k] * d_1[k] / (d_1[k] - d_2[k])
     met = np.concatenate([time[np.abs(distance) <= zero], between])

@@ -1,6 +1,6 @@
-"""How well motor rates and torques become foot rates and forces at a pose.
+"""How well a pose turns motor rates and torques into foot rates and forces.
 
-Both motors turn and the foot only shifts, so J [m/rad] is of one unit, and its singular values
+Both motors turn and the foot only shifts, so all of J has one unit, m/rad, and its singular values
 s_1 >= s_2 >= 0 can be compared. With J = U diag(s) V^T, the columns of U being u_1, u_2:
 
     |theta_dot| = 1 rad/s   foot_dot = J theta_dot    an ellipse with semi-axes s_i along u_i
@@ -29,8 +29,8 @@ from fivebar_sim.kinematics.planar import angle_between, cross
 from fivebar_sim.kinematics.rates import jacobian
 
 LOST = 1e-12
-"""A singular value below this part of the greater one, or of the leg's size per radian, is 0: what
-rounding of a pose that is singular leaves, some hundred eps, is below."""
+"""A singular value below this fraction of the greater one, or of the leg's size per radian, is 0:
+rounding of a singular pose leaves some hundred eps, which is below."""
 
 
 class Ellipse(NamedTuple):
@@ -38,8 +38,8 @@ class Ellipse(NamedTuple):
 
     Attributes:
         semi_axes: Half lengths, (..., 2).
-        directions: Unit vectors in the hip frame, one a row: directions[..., i, :] is that of
-            semi_axes[..., i]; (..., 2, 2). Their signs, and of a circle both, are arbitrary.
+        directions: Unit vectors in the hip frame, one in each row: directions[..., i, :] belongs to
+            semi_axes[..., i]; (..., 2, 2). Their signs are arbitrary; for a circle so are both.
     """
 
     semi_axes: Array
@@ -165,7 +165,7 @@ def transmission_angles(
 
     det J = |AB| |ED| |BF| / |BC| sin(mu_B) sin(mu_D) / sin(mu_C), signs aside: each is 0 or pi
     where its factor is singular. At B the line is BF, not L2: a force of the foot along BF is
-    borne by motor A alone, with the arm |AB| sin(mu_B). Singular poses are no exception, but for
+    borne by motor A alone, with the arm |AB| sin(mu_B). Singular poses are allowed, except for
     B = D.
 
     Args:
@@ -189,17 +189,15 @@ def transmission_angles(
 
 
 def _decompose(leg: FiveBar, theta: ArrayLike, assembly: int | None) -> tuple[Array, Array, Array]:
-    """Return det J (...), the singular values of J (..., 2) and U (..., 2, 2).
-
-    s_2 = |det J| / s_1, with det J from its factors: where s_1 is great (B, C and D nearly in line)
-    the rounding of J would drown it.
-    """
+    """Return det J (...), the singular values of J (..., 2) and U (..., 2, 2)."""
     J = jacobian(leg, theta, assembly)
     A, E = bases(leg)
     p = closed_points(leg, theta, assembly)
     DC = p.C_right - p.D
     det = cross(p.B - A, p.F - p.B) * cross(p.D - E, DC) / cross(p.C_left - p.B, DC)
     U, s, _ = np.linalg.svd(J)
+    # s_2 = |det J| / s_1 with det J from its factors: where s_1 is great, B, C and D nearly in
+    # line, the rounding of J would drown the s_2 of the SVD.
     s[..., 1] = np.abs(det) / np.where(s[..., 0] > 0.0, s[..., 0], 1.0)
     s[s <= LOST * np.maximum(s[..., :1], leg.size)] = 0.0
     return det, s, U

@@ -43,7 +43,7 @@ from fivebar_sim.kinematics.planar import cross
 from fivebar_sim.kinematics.reach import foot_radius_and_angle, inverse, points_at
 
 EDGE = 1e-6
-"""Sine of the angle between two links a, b that counts as none. A foot on the edge of reach to
+"""Sine of the angle between two links a, b that counts as 0. A foot on the edge of reach to
 rounding, 16 eps of (a + b)^2, is solved with a sine of up to sqrt(16 eps) (a + b) / sqrt(a b):
 1.2e-7 for equal links, 1e-6 for 280 : 1."""
 
@@ -52,9 +52,9 @@ class Distances(NamedTuple):
     """Signed distances from the three kinds of singularity [m], each of shape (...).
 
     Attributes:
-        side_A: Distance of A, B, F from being in line; has the sign of s_A.
-        side_E: Distance of E, D, C from being in line; has the sign of s_E.
-        loop: Distance of B, C, D from being in line; has the sign of the assembly mode.
+        side_A: How far A, B, F are from being in line, with the sign of s_A.
+        side_E: How far E, D, C are from being in line, with the sign of s_E.
+        loop: How far B, C, D are from being in line, with the sign of the assembly mode.
     """
 
     side_A: Array
@@ -80,7 +80,7 @@ def distances(leg: FiveBar, theta: ArrayLike, assembly: int | None = None) -> Di
 
     Raises:
         LoopOpenError: Where the links do not meet, and at B = D, where C may be anywhere on a
-            circle: `distances_of` takes that pose, and `distances_at` gives it.
+            circle: `distances_of` accepts that pose, and `distances_at` can return it.
     """
     return distances_of(leg, closed_points(leg, theta, assembly))
 
@@ -108,6 +108,7 @@ def distances_of(leg: FiveBar, points: Points) -> Distances:
     """Return the signed distances of poses given by their joints; formulas as `distances`."""
     A, E = bases(leg)
     rho, _ = foot_radius_and_angle(leg)
+    # The loop may be open by rounding: each side takes the C of its own chain.
     return Distances(
         side_A=cross(points.F - A, points.B - A) / max(leg.L1, rho),
         side_E=cross(points.C_right - E, points.D - E) / max(leg.L4, leg.L3),
