@@ -29,7 +29,7 @@ def read_through(path: Path) -> None:
     """Read a recording in this process.
 
     Raises:
-        Exception: Of any kind, if Rerun cannot read it.
+        Exception: Any, if Rerun cannot read it.
     """
     from rerun.chunk import RrdReader
 

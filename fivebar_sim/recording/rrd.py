@@ -67,7 +67,7 @@ def write(path: Path, runs: Sequence[Run], labels: Sequence[str] = ()) -> None:
 
     Args:
         path: The file; an existing one is overwritten.
-        runs: The runs to draw, at least one. Of several each has its own colour, and its entities
+        runs: The runs to draw, at least one. Each of several has its own colour, and its entities
             are under run_1, run_2, ...
         labels: Names of the runs, all different; by default the names of their scenarios.
 

@@ -71,7 +71,7 @@ def nearest_on(curves: Curves, bar: FourBar, p: Complex) -> tuple[Rows, Complex,
         p: Points [m], (n,).
 
     Returns:
-        owner: Which p a minimum is for, (m,).
+        owner: Index of the p that a minimum is for, (m,).
         F: The minimum [m], (m,).
         pose: For each p the nearest F of the sampled poses [m], (n,).
     """
@@ -103,7 +103,7 @@ def _near_segments(curves: Curves, p: Complex) -> tuple[Rows, Rows, Rows]:
 
     Returns:
         pose: Row of the nearest of the sampled poses, (n,).
-        owner: Which p a segment is for, (m,).
+        owner: Index of the p that a segment is for, (m,).
         segment: The segment's row, (m,).
     """
     d = np.abs(p[:, None] - curves.F)

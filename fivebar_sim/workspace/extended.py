@@ -264,7 +264,7 @@ def _candidates(region: Extended, p: Complex) -> tuple[Rows, Complex, Complex]:
     """Return the candidates for the point of the boundary nearest to each p (n,).
 
     Returns:
-        owner: Which p a candidate is for, (m,).
+        owner: Index of the p that a candidate is for, (m,).
         c: The candidate, (m,): on the circles, inner first; on the curves; then the nearest poses.
         b: For each p one of its candidates, or 0 if none is known, (n,).
     """
