@@ -111,7 +111,7 @@ def test_a_file_without_end_is_refused(shell: Shell, make: Callable[[str], None]
         make(name)
     Path("baselines").mkdir()
     make("baselines/short.json")
-    what = "it is no regular file"
+    what = "it is not a regular file"
     csv = ("--set", "path.kind=csv", "--set", "path.file=pipe.csv")
     refusals = [
         (("run", "pipe.toml"), f"cannot read scenario pipe.toml: {what}"),

@@ -1,1 +1,1 @@
-"""Files: what is read and its limits, what is written whole or not at all, what ships."""
+"""Files: size limits of inputs, atomic writes, and the folders that ship with the package."""

@@ -1,4 +1,4 @@
-"""Where the shipped files are: beside the package in a checkout, inside it in a wheel."""
+"""Paths of the shipped files: beside the package in a checkout, inside it in a wheel."""
 
 from __future__ import annotations
 
@@ -23,5 +23,5 @@ def folder(name: str) -> Path:
 
 
 def shipped(name: str, suffix: str = ".toml") -> dict[str, Path]:
-    """Return the files of a shipped folder by stem, sorted."""
+    """Return the files of a shipped folder by stem, sorted by name."""
     return {path.stem: path for path in sorted(folder(name).glob(f"*{suffix}"))}

@@ -1,4 +1,4 @@
-"""TOML tables: reading, changing by KEY=VALUE, and strict conversion; errors name the key."""
+"""TOML tables: reading, changes by KEY=VALUE, and strict conversion; errors name the key."""
 
 from __future__ import annotations
 
@@ -19,17 +19,18 @@ Table = dict[str, Any]
 
 
 DEEPEST = 20
-"""Tables and arrays in each other that an input may have; the deepest that means anything is 4."""
+"""Deepest nesting of tables and arrays in an input; no legal key needs more than 4 levels."""
 
 
 def read(path: Path, what: str) -> Table:
     """Return the table of a TOML file; `what` names the kind of file in messages.
 
     Raises:
-        ConfigError: No such file, not readable, not TOML.
+        ConfigError: The file is missing, unreadable or not TOML.
     """
     try:
         input_file.check(path, input_file.TEXT)
+        # "-sig" drops the byte order mark that Windows editors put in front; TOML allows none.
         return _loads(path.read_text(encoding="utf-8-sig"))
     except OSError as error:
         raise ConfigError(f"cannot read {what} {path}: {error.strerror}") from None
@@ -45,7 +46,7 @@ def _loads(text: str) -> Table:
     """
     try:
         table = tomllib.loads(text)
-    # tomllib recurses into arrays; a file must not end in a traceback.
+    # tomllib recurses into arrays; a file must not cause a traceback.
     except RecursionError:
         raise ValueError("nested too deep") from None
     if is_deep(table):
@@ -55,6 +56,7 @@ def _loads(text: str) -> Table:
 
 def is_deep(value: Any) -> bool:
     """Return whether more than `DEEPEST` tables or arrays are nested in a value."""
+    # Level by level, not recursively: the nesting may be deeper than Python's stack.
     level = [value]
     for _ in range(DEEPEST):
         nests = [each for each in level if isinstance(each, (list, Mapping))]
@@ -69,7 +71,7 @@ def is_deep(value: Any) -> bool:
 
 
 def parse_setting(setting: str) -> tuple[list[str], Any]:
-    """Return key parts and value of "path.radii=[0.01, 0.02]"; what is not TOML is a string.
+    """Return key parts and value of "path.radii=[0.01, 0.02]"; if not TOML, it is a string.
 
     Raises:
         ConfigError: No "=", or an empty part in the key.
@@ -82,16 +84,17 @@ def parse_setting(setting: str) -> tuple[list[str], Any]:
         table = _loads(f"value = {text}")
     except ValueError:
         return parts, text.strip()
+    # A line break in the text could smuggle in further keys: then it is a string too.
     return parts, table["value"] if len(table) == 1 else text.strip()
 
 
 def _is_utf8(text: str) -> bool:
-    """Return whether a command line's text was UTF-8: other bytes come as lone surrogates."""
+    """Return whether an argument was UTF-8; Python turns other bytes into lone surrogates."""
     return not any("\ud800" <= c <= "\udfff" for c in text)
 
 
 def put(table: Table, parts: list[str], value: Any, where: str) -> None:
-    """Set the value at a dotted key, making tables on the way.
+    """Set the value at a dotted key; missing tables on the way are made.
 
     Raises:
         ConfigError: If a part on the way is a value, not a table.
@@ -114,7 +117,7 @@ def flat(table: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]
 
 
 def check_finite(table: Mapping[str, Any], where: str) -> None:
-    """Raise if any number in the table is NaN, infinite, or an integer that TOML has no room for.
+    """Raise if any number in the table is NaN, infinite, or an integer beyond 64 bits.
 
     Raises:
         ConfigError: Naming the key.
@@ -129,7 +132,7 @@ def check_finite(table: Mapping[str, Any], where: str) -> None:
 
 
 def _leaves(value: Any) -> Iterator[Any]:
-    """Yield what a value holds at any depth of its arrays and tables."""
+    """Yield the values at any depth of arrays and tables."""
     if isinstance(value, (list, Mapping)):
         for part in value.values() if isinstance(value, Mapping) else value:
             yield from _leaves(part)
@@ -161,7 +164,8 @@ def bounds(
         where: The file, for messages.
 
     Raises:
-        ConfigError: Not a table, an unknown key, one key twice, or no number or [low, high].
+        ConfigError: Not a table, an unknown key, a key set twice, or a bound that is neither a
+            number nor [low, high].
     """
     if not isinstance(table, dict):
         raise ConfigError(f"{where}: {name} must be a table, got {table!r}")
@@ -173,6 +177,7 @@ def bounds(
             raise ConfigError(f"{where}: {name}.{key} is set twice")
         # A single number is an upper bound: nothing is wanted from below.
         pair = bound if isinstance(bound, list) else [-math.inf, bound]
+        # bool is a subclass of int, but true is not a bound.
         numbers = all(isinstance(b, (int, float)) and not isinstance(b, bool) for b in pair)
         if len(pair) != 2 or not numbers or not pair[0] <= pair[1]:
             raise ConfigError(
@@ -184,7 +189,7 @@ def bounds(
 
 
 def keys(kind: type) -> list[str]:
-    """Return the keys that a Struct takes, its tag's included."""
+    """Return the keys that a Struct takes, including its tag's."""
     tag = kind.__struct_config__.tag_field
     return [*([tag] if tag else []), *(f.encode_name for f in msgspec.structs.fields(kind))]
 
@@ -197,7 +202,7 @@ WORDS = {
     "object": "a table",
     "str": "a string",
 }
-"""What msgspec's types are called in messages."""
+"""Names of msgspec's types in messages."""
 
 
 def convert(table: Any, kind: type[T], name: str, where: str) -> T:
@@ -205,7 +210,7 @@ def convert(table: Any, kind: type[T], name: str, where: str) -> T:
 
     Args:
         table: What the file has under `name`.
-        kind: A Struct without Structs in it.
+        kind: A Struct whose fields are not Structs.
         name: The table's key, for messages.
         where: The file, for messages.
 
@@ -222,13 +227,14 @@ def convert(table: Any, kind: type[T], name: str, where: str) -> T:
 
 
 def _explain(message: str, table: Table, kind: type, name: str) -> str:
-    """Return msgspec's message with the key in front and what came behind."""
+    """Return msgspec's message with the key in front and the value that came at the end."""
     text, _, at = message.partition(" - at `$")
     at = at.rstrip("`").lstrip(".")
     missing = re.fullmatch(r"Object missing required field `(.+)`", text)
     if missing:
         return f"{name}.{missing[1]} is missing"
-    if not at:  # a Struct's own check, which begins with the key
+    # Without a place it is a Struct's own check, whose text begins with the key.
+    if not at:
         return f"{name}.{text}"
 
     # The place may go on into an array: the value to show is the whole key's.

@@ -1,6 +1,6 @@
-"""Files that are written whole or not at all: beside their place first, then renamed to it.
+"""Files that are written whole or not at all: into a temporary file beside, then renamed.
 
-A path that is not UTF-8 is written with backslashes.
+Text that is not UTF-8 is written with backslashes.
 """
 
 from __future__ import annotations
@@ -15,31 +15,33 @@ from fivebar_sim.errors import ConfigError
 
 
 def check_place(path: Path) -> None:
-    """Raise unless a whole file may be written at path, as far as the system tells before.
+    """Raise unless a file can be written at path, as far as the system can tell beforehand.
 
     Raises:
-        ConfigError: No file can be made there, or something else is there.
+        ConfigError: No file can be made there, or something other than a file is there.
     """
     try:
         _check_free(path)
+        # Missing folders are made later, so the nearest existing one decides.
         there = next((p for p in path.absolute().parents if p.exists()), path)
     except OSError as error:
         raise ConfigError(f"cannot write {path}: {error.strerror or error}") from None
     if not there.is_dir() or not os.access(there, os.W_OK | os.X_OK):
-        raise ConfigError(f"cannot write {path}: {there} is not a directory one may write in")
+        raise ConfigError(f"cannot write {path}: {there} is not a writable directory")
 
 
 def _check_free(path: Path) -> None:
-    """Raise if something is there that a file must not replace."""
+    """Raise if a directory or a device is there, which a file must not replace."""
     if path.is_dir():
         raise ConfigError(f"cannot write {path}: a directory is there")
-    if path.exists() and not path.is_file():  # a device would be renamed away
-        raise ConfigError(f"cannot write {path}: something that is no file is there")
+    # The rename would remove a device such as /dev/null.
+    if path.exists() and not path.is_file():
+        raise ConfigError(f"cannot write {path}: something that is not a file is there")
 
 
 @contextmanager
 def beside(path: Path) -> Iterator[Path]:
-    """Give a place beside a file to write to; it is renamed to the file if all goes well.
+    """Give a temporary path beside a file; it is renamed to the file if no error occurs.
 
     Raises:
         ConfigError: The file cannot be written.
@@ -62,7 +64,7 @@ def beside(path: Path) -> Iterator[Path]:
 
 
 def write(path: Path, content: str | bytes) -> None:
-    """Write a whole file; its folder is made.
+    """Write a file atomically; missing folders are made.
 
     Raises:
         ConfigError: The file cannot be written.
@@ -77,10 +79,10 @@ def write(path: Path, content: str | bytes) -> None:
 
 
 def append(path: Path, text: str) -> None:
-    """Append a text to a file, which is made if it is not there, and so is its folder.
+    """Append text to a file; a missing file or folder is made.
 
     Raises:
-        ConfigError: The place cannot be written.
+        ConfigError: The file cannot be written.
     """
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
