@@ -1,6 +1,6 @@
-"""MuJoCo simulation of the closed-chain five-bar leg, with torque and load numbers that are proven.
+"""MuJoCo simulation of the closed-chain five-bar leg, with validated torque and load numbers.
 
-Names load on first use, so that the pure NumPy rooms never wait for MuJoCo.
+Names load on first use, so that the pure NumPy packages never wait for MuJoCo.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ _MODULES = {
     "hip": "kinematics.hip",
     "two_link": "kinematics.two_link",
 }
-"""The exported modules, and where they are."""
+"""The exported modules, and the path of each within the package."""
 
 _HOMES = {
     "Feedback": "control",
@@ -53,7 +53,7 @@ _HOMES = {
     "run": "rollout",
     "run_all": "rollout",
 }
-"""The module that each other export is of."""
+"""The module that defines each other export."""
 
 
 def __getattr__(name: str) -> Any:
@@ -65,4 +65,5 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
+    # Without this, names that are not loaded yet would be missing from dir() and completion.
     return sorted({*globals(), *__all__})

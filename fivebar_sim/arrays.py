@@ -17,7 +17,7 @@ def first_index(bad: Bools) -> tuple[int, ...]:
 
 
 def at(index: tuple[int, ...]) -> str:
-    """Return " at index (2, 0)" for a message, or nothing for a single value."""
+    """Return " at index (2, 0)" for a message, or "" for a single value."""
     return f" at index {index}" if index else ""
 
 
@@ -26,7 +26,7 @@ def as_vectors(values: ArrayLike, name: str, size: int) -> Array:
 
     Args:
         values: Points, or tuples of angles.
-        name: What the argument is called, for the message.
+        name: Name of the argument, for the message.
         size: Length of the last axis.
 
     Raises:
@@ -48,10 +48,10 @@ def as_pairs(values: ArrayLike, name: str) -> Array:
 
 
 def finite(values: Array, name: str) -> Array:
-    """Return the values.
+    """Return the values if all are finite.
 
     Raises:
-        ArgumentError: Unless all are finite; names the first index.
+        ArgumentError: Some value is NaN or infinite; the message names the first index.
     """
     good = np.isfinite(values)
     if not good.all():
@@ -63,7 +63,7 @@ def together(**arrays: Array) -> list[Array]:
     """Return the arrays broadcast to one shape.
 
     Raises:
-        ArgumentError: If their shapes do not fit; names them.
+        ArgumentError: The shapes do not broadcast; the message names the arrays.
     """
     try:
         return list(np.broadcast_arrays(*arrays.values()))

@@ -1,4 +1,4 @@
-"""Checks of single numbers, with one form of message: key, legal range, unit, what came."""
+"""Checks of single numbers. Every message has the same form: key, legal range, unit, value."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ import numpy as np
 from fivebar_sim.errors import ArgumentError, FiveBarError
 
 LARGEST = sys.float_info.max
+"""Largest finite float."""
 
 
 def is_finite(value: Any) -> bool:
@@ -35,19 +36,20 @@ def check_number(
     """Raise unless value is a finite number in [low, high], or in (low, high) if strict.
 
     Args:
-        key: What the number is called; the message starts with it.
-        value: What came.
+        key: Name of the number; the message starts with it.
+        value: The number.
         unit: Unit of the range in the message; "" for a pure number.
         low: Least legal value.
         high: Greatest legal value.
         strict: Whether the ends are excluded.
-        error: What to raise.
+        error: Class of the error to raise.
 
     Raises:
-        ArgumentError: Or the class given as `error`.
+        ArgumentError: The number is out of range; `error` may name another class.
     """
     if is_finite(value) and (low < value < high if strict else low <= value <= high):
         return
+    # An infinite end is written as open: inf itself is never legal.
     left = "(" if strict or math.isinf(low) else "["
     right = ")" if strict or math.isinf(high) else "]"
     legal = f"{left}{low:g}, {high:g}{right} {unit}".rstrip()
@@ -55,14 +57,15 @@ def check_number(
 
 
 FINEST = 1e-12
-"""The finest step of angles [rad]: a turn in a float has no much finer one."""
+"""Finest step of angles [rad]: a float near one turn resolves hardly more."""
 
 
 def check_step(key: str, value: Any, *, high: float = math.inf) -> None:
-    """Raise unless value is a step that angles can be rounded to [rad], or 0 for none.
+    """Raise unless value is a step to round angles to [rad]; 0 means no rounding.
 
     Raises:
-        ArgumentError: It is not in [0, high], or finer than `FINEST`: angles would overflow.
+        ArgumentError: The step is not in [0, high], or finer than `FINEST`: angle / step would
+            overflow.
     """
     check_number(key, value, "rad", low=0.0, high=high)
     if 0.0 < value < FINEST:

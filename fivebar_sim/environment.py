@@ -1,7 +1,7 @@
 """One leg as a dm_control environment: install the extra `control`.
 
 The physics are MuJoCo's own steps of the same model, one command a step; `dm_control.viewer` opens
-an environment. Importing this starts nothing: dm_control is imported by `load`.
+an environment. Importing this module has no side effects: `load` imports dm_control.
 """
 
 from __future__ import annotations
@@ -35,21 +35,21 @@ def load(
     flat_observation: bool = False,
     **options: Any,
 ) -> control.Environment:
-    """Return a leg at a task as a `dm_env.Environment`.
+    """Return a leg with a task as a `dm_env.Environment`.
 
-    `environment.task` has the reward's `terms` by name and the `reason` of an end.
+    `environment.task` has the reward's `terms` by name and the `reason` why an episode ended.
 
     Args:
         task: "track", "stand", "hop", "gait", or a Task.
-        leg: A leg, a preset's name, or a TOML file; None is the task's.
-        seed: Of all the episodes; None is another one each time.
-        randomise: Ranges of what the leg draws; None is nothing.
-        model_seed: Of that draw.
+        leg: A leg, a preset's name, or a TOML file; None: the task's own leg.
+        seed: Seed of all episodes; None: a different one each time.
+        randomise: Ranges of the leg's random parameters; None: no randomisation.
+        model_seed: Seed of the random parameters.
         flat_observation: Whether the observation's parts are joined in one array.
-        options: Of the task: servo, action, period ...
+        options: The task's other keywords: servo, action, period ...
 
     Raises:
-        ArgumentError: Unknown task or option, or a seed that is no whole number from 0 on.
+        ArgumentError: Unknown task or option, or a seed that is not a whole number >= 0.
         UnreachableError: The leg cannot follow the path.
         ModuleNotFoundError: dm-control is not installed.
     """
@@ -69,8 +69,9 @@ def load(
 
 
 def _dm_leg() -> ModuleType:
-    """Return the module that needs dm_control, with a GL chosen before that loads OpenGL."""
-    gl.settle()
+    """Return the module that needs dm_control."""
+    # First, since dm_control loads OpenGL when it is imported.
+    gl.set_mujoco_gl()
     try:
         from fivebar_sim.tasks import dm_leg
     except ModuleNotFoundError as error:

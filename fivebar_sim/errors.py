@@ -1,6 +1,6 @@
-"""The errors that bad input raises: one line each, with the facts as attributes.
+"""The errors raised for bad input: one-line messages, with the facts as attributes.
 
-Every class refines a builtin, so that callers may catch either.
+Every class also inherits from a builtin error, so that callers may catch either.
 """
 
 from __future__ import annotations
@@ -18,14 +18,14 @@ class ArgumentError(FiveBarError, ValueError):
 
 
 class GeometryError(FiveBarError, ValueError):
-    """A leg that cannot exist: a length, mass or mode outside its legal range."""
+    """An impossible leg: a length, mass or mode outside its legal range."""
 
 
 class PoseError(FiveBarError, ValueError):
-    """One or more poses of a batch that cannot be, or cannot be answered for.
+    """One or more poses of a batch that do not exist, or have no finite answer.
 
     Attributes:
-        index: Index of the first of them in the batch; () for a single pose.
+        index: Index of the first bad pose in the batch; () for a single pose.
     """
 
     def __init__(self, message: str, index: tuple[int, ...] = ()) -> None:
@@ -34,7 +34,7 @@ class PoseError(FiveBarError, ValueError):
 
 
 class UnreachableError(PoseError):
-    """Foot targets that no pose reaches."""
+    """Foot targets out of reach."""
 
 
 class LoopOpenError(PoseError):
@@ -42,7 +42,7 @@ class LoopOpenError(PoseError):
 
 
 class SingularError(PoseError):
-    """Poses at which the asked rate or Jacobian is infinite."""
+    """Poses at which the requested rate or Jacobian is infinite."""
 
 
 class ConfigError(FiveBarError, ValueError):
@@ -69,8 +69,8 @@ def unknown(what: str, name: str, known: Iterable[str]) -> str:
     """Return the message for a name that is not among the known ones, with a guess.
 
     Args:
-        what: The kind of thing, in the singular ("preset").
-        name: The name that came.
+        what: Kind of thing, in the singular ("preset").
+        name: The unknown name.
         known: The legal names.
     """
     legal = sorted(known)

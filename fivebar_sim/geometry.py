@@ -1,4 +1,4 @@
-r"""The five-bar leg as numbers: link lengths, modes, masses; and the presets that ship.
+r"""The five-bar leg as numbers: link lengths, modes, masses; and the shipped presets.
 
 A ---- L5 ---- E      A, E driven; theta_A, theta_E anticlockwise from +x of the hip frame to +z
  \            /       B, D passive knees; C closes the loop
@@ -73,9 +73,9 @@ def moved(body: Link, at: tuple[float, float], angle: float = 0.0) -> Link:
 
 
 def combined(*bodies: Link) -> Link:
-    """Return several bodies of one frame as one, by the parallel axis theorem."""
+    """Return several bodies in one frame as one body, by the parallel axis theorem."""
     mass = sum(b.mass for b in bodies)
-    # No mass has no centre: any of the bodies is the answer.
+    # Without mass there is no centre of mass: any of the bodies is the answer.
     if mass == 0.0:
         return bodies[0]
     x = sum(b.mass * b.com[0] for b in bodies) / mass
@@ -85,24 +85,24 @@ def combined(*bodies: Link) -> Link:
 
 
 CLOSING = 1e-12
-"""By this part a length may exceed what closes: the rounding of lengths given in decimals."""
+"""Relative slack of the closing condition: the rounding of lengths given in decimals."""
 
 LONGEST = 1e3
-"""Upper end of lengths [m]."""
+"""Largest length [m]."""
 
 HEAVIEST = 1e6
-"""Upper end of masses [kg], inertias [kg m^2] and densities [kg/m^3]."""
+"""Largest mass [kg], inertia [kg m^2] and density [kg/m^3]."""
 
 
 @dataclass(frozen=True, slots=True)
 class FiveBar:
-    """A five-bar leg in m, kg and rad; the defaults are the classic leg's.
+    """A five-bar leg in m, kg and rad; the defaults are those of the classic leg.
 
-    A link without `mass` is a capsule of `radius` and `density` between its joints, and L2 also
-    carries the foot, a ball of `foot_radius`. With `mass` given, those four numbers are the whole
-    links (foot and extension included), `com` their centres along the link from the inner joint
-    (default: the middle of L1..L4), `inertia` those about the centres (default: slender rods,
-    m L^2 / 12).
+    Without `mass`, a link is a capsule of `radius` and `density` between its joints, and L2 also
+    carries the foot, a ball of `foot_radius`. With `mass`, the four numbers are the masses of the
+    whole links (foot and extension included), `com` their centres of mass along the link from the
+    inner joint (default: the middle of L1..L4), and `inertia` their inertias about those centres
+    (default: slender rods, m L^2 / 12).
 
     Attributes:
         L1: |AB| [m].
@@ -116,9 +116,9 @@ class FiveBar:
         mode: Working mode (s_A, s_E): theta = alpha + s beta on each side.
         assembly: +1 or -1, the sign of BDx BCz - BDz BCx.
         mass: Masses of L1..L4 [kg], or None for capsules.
-        com: Centres along L1..L4 [m], only with `mass`.
+        com: Centres of mass along L1..L4 [m], only with `mass`.
         inertia: Inertias of L1..L4 about their centres [kg m^2], only with `mass`.
-        radius: Radius of the capsules [m]; with `mass` given it is only drawn.
+        radius: Radius of the capsules [m]; with `mass` it only matters for pictures.
         density: Density of capsules and foot [kg/m^3].
         foot_radius: Radius of the ball at F [m].
         armature: Rotor inertia of each motor, reflected to A and E [kg m^2].
@@ -179,7 +179,7 @@ class FiveBar:
 
     def _check_modes(self) -> None:
         mode = tuple(self.mode) if isinstance(self.mode, (tuple, list)) else ()
-        # True == 1 in Python, and would pass as a sign but for the check of the type.
+        # True == 1 in Python, so only the check of the type keeps it from passing as a sign.
         if mode not in MODES or not all(type(s) is int for s in mode):
             raise GeometryError(f"mode must be one of {MODES}, got {self.mode!r}")
         object.__setattr__(self, "mode", mode)
@@ -203,7 +203,7 @@ class FiveBar:
 
     @property
     def size(self) -> float:
-        """The longer of the two side chains [m]: what tolerances are relative to."""
+        """Length of the longer side chain [m]; tolerances are relative to it."""
         return max(self.L1 + self.L2 + self.L6, self.L4 + self.L3)
 
     @property
@@ -221,7 +221,7 @@ class FiveBar:
             return L1, L2, L3, L4
 
         L1, L2, L3, L4 = (capsule(L, self.radius, self.density) for L in lengths)
-        # Foot and extension are rigid with L2, so their inertia is its inertia.
+        # Foot and extension are fixed to L2, so they count as part of it.
         parts = [L2, moved(ball(self.foot_radius, self.density), self.foot_offset)]
         if self.L6 > 0.0:
             extension = capsule(self.L6, self.radius, self.density)
@@ -236,11 +236,10 @@ class FiveBar:
 
     @classmethod
     def load(cls, source: str | Path) -> FiveBar:
-        """Return the leg of a preset's name ("classic") or of a TOML file's path.
+        """Return the leg of a preset ("classic") or of a TOML file.
 
         Raises:
-            ConfigError: Unknown preset, unreadable file, unknown key.
-            GeometryError: A number out of its range.
+            ConfigError: Unknown preset, unreadable file, unknown key, or a value out of range.
         """
         return cls.from_table(read_table(source), str(source))
 
@@ -249,7 +248,7 @@ class FiveBar:
         """Return the leg of a TOML table; `where` names the table in messages.
 
         Raises:
-            ConfigError: An unknown key, or a value out of its range.
+            ConfigError: An unknown key, or a value out of range.
         """
         known = [field.name for field in fields(cls)]
         for key in table:
@@ -268,15 +267,16 @@ class FiveBar:
 
 
 def read_table(source: str | Path) -> dict[str, Any]:
-    """Return the TOML table of a leg: of a preset's name, or of a file's path.
+    """Return the TOML table of a preset or of a file.
 
     Raises:
-        ConfigError: Unknown preset, no such file, not TOML.
+        ConfigError: Unknown preset, or a file that is missing or not TOML.
     """
     presets = resources.shipped("models/legs")
     path = presets.get(str(source), Path(source))
     if path.suffix != ".toml":
         raise ConfigError(f"{unknown('leg preset', str(source), presets)}; or a path to a .toml")
+    # The file's name is the leg's, unless the file gives another.
     return {"name": path.stem, **tables.read(path, "leg")}
 
 
@@ -286,7 +286,7 @@ def _check(key: str, value: Any, **bounds: Any) -> None:
 
 
 def _floats(key: str, values: object, count: int) -> tuple[float, ...]:
-    """Return values as `count` finite floats."""
+    """Return values as a tuple of `count` finite floats."""
     if not isinstance(values, (tuple, list)) or len(values) != count:
         raise GeometryError(f"{key} must be {count} numbers [{UNITS[key]}], got {values!r}")
     for value in values:

@@ -1,6 +1,6 @@
 """One leg as a Gymnasium environment; importing this registers the tasks as fivebar/Track-v0, ...
 
-The only home of Gymnasium beside `vector`: install the extra `rl`.
+Only this module and `vector` need Gymnasium: install the extra `rl`.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ RENDER_MODES = ("rgb_array",)
 
 
 def spaces(episodes: Episodes) -> tuple[Space[Array], Space[Array]]:
-    """Return the spaces of one leg's observation and action."""
+    """Return the observation space and the action space of one leg."""
     size = sum(part.size for part in episodes.task.parts.values())
     seen: Any = Box(-np.inf, np.inf, (size,), np.float64)
     acted: Any = Box(episodes.low, episodes.high, dtype=np.float64)
@@ -31,7 +31,7 @@ def spaces(episodes: Episodes) -> tuple[Space[Array], Space[Array]]:
 
 
 def layout(task: Task) -> dict[str, slice]:
-    """Return where an observation has each of its parts."""
+    """Return the slice of an observation that holds each of its parts."""
     found = {}
     start = 0
     for name, part in task.parts.items():
@@ -41,19 +41,19 @@ def layout(task: Task) -> dict[str, slice]:
 
 
 class LegEnv(gymnasium.Env[Array, Array]):
-    """A leg at a task.
+    """One leg with one task.
 
     Observations are the task's `parts` one after the other (`layout` says where), actions its
     `actions` within their bounds, both in SI units and radians; nothing is clipped.
     `gymnasium.wrappers.RescaleAction` makes actions of [-1, 1]. info has the reward's "terms" by
-    name and the "reason" why the episode is over, "" while it is not.
+    name and the "reason" why the episode ended, "" before its end.
 
     Args:
         task: "track", "stand", "hop", "gait", or a Task.
         render_mode: "rgb_array" or None.
-        randomise: Ranges of what the leg draws; None is nothing.
-        model_seed: Of that draw.
-        options: Of the task: leg, servo, action, period ...
+        randomise: Ranges of the leg's random parameters; None: no randomisation.
+        model_seed: Seed of the random parameters.
+        options: The task's keywords: leg, servo, action, period ...
 
     Raises:
         ArgumentError: Unknown task, option or render mode.
@@ -73,6 +73,7 @@ class LegEnv(gymnasium.Env[Array, Array]):
             raise ArgumentError(unknown("render_mode", str(render_mode), RENDER_MODES))
         self._group = LegGroup(tasks.task(task, **options), [model_seed], randomise)
         self.render_mode = render_mode
+        # Made by the first `render`: training without pictures needs no GL.
         self._picture = None
         self.task = self._group.task
         self.episodes = self._group.episodes
@@ -86,11 +87,11 @@ class LegEnv(gymnasium.Env[Array, Array]):
         """Return the first observation of an episode and info.
 
         Args:
-            seed: Of this and the following episodes; None goes on with the last one.
-            options: There are none.
+            seed: Seed of this and the following episodes; None: continue with the last one.
+            options: Unused.
 
         Raises:
-            gymnasium.error.Error: A seed that is no whole number from 0 on.
+            gymnasium.error.Error: The seed is not a whole number >= 0.
         """
         super().reset(seed=seed)
         return _row(self._group.reset([self.np_random]))[0], {}
@@ -99,7 +100,7 @@ class LegEnv(gymnasium.Env[Array, Array]):
         """Return observation, reward, terminated, truncated and info after a control period.
 
         Raises:
-            ArgumentError: An action that is none of the action space.
+            ArgumentError: The action is not in the action space.
         """
         values = self.episodes.check_action(action, self.episodes.low.shape)
         outcome = self._group.step(values[None])
@@ -117,17 +118,17 @@ class LegEnv(gymnasium.Env[Array, Array]):
             return None
         if self._picture is None:
             self._picture = LegPicture(self._group.models[0], self.task.leg)
-        return self._picture.taken(self.episodes.qpos[0])
+        return self._picture.take(self.episodes.qpos[0])
 
     def close(self) -> None:
-        """Let go of what draws the pictures."""
+        """Free the GL context of the pictures."""
         if self._picture is not None:
             self._picture.close()
             self._picture = None
 
 
 def _row(outcome: Outcome) -> tuple[Array, dict[str, Any]]:
-    """Return observation and info of the one leg."""
+    """Return observation and info of the only leg of a group."""
     info = {
         "terms": {name: float(term[0]) for name, term in outcome.terms.items()},
         "reason": str(REASONS[outcome.reason[0]]),
@@ -136,9 +137,10 @@ def _row(outcome: Outcome) -> tuple[Array, dict[str, Any]]:
 
 
 def register() -> None:
-    """Register every task with Gymnasium, one leg and many; again is no harm."""
+    """Register every task with Gymnasium, for one leg and for many; twice is harmless."""
     for kind in tasks.KINDS:
         name = f"fivebar/{kind.capitalize()}-v0"
+        # Gymnasium warns when a name is registered twice.
         if name not in gymnasium.registry:
             gymnasium.register(
                 name,

@@ -12,13 +12,14 @@ Integrator = Literal["discrete", "implicitfast"]
 
 CONNECT = {
     "discrete": ((1e-4, 1.0), (0.95, 0.99, 0.001)),
-    "implicitfast": ((2.0, 1.0), (0.9999, 0.9999, 0.001)),  # time constant in timesteps
+    # Here the time constant is in timesteps: below two of them the leg flies apart.
+    "implicitfast": ((2.0, 1.0), (0.9999, 0.9999, 0.001)),
 }
-"""solref and solimp of the loop's closure, by integrator; measured in docs/model.md."""
+"""solref and solimp of the loop's closure by integrator; docs/model.md shows what they do."""
 
 
 class Sim(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """How the run is simulated.
+    """The table [sim] of a scenario.
 
     Attributes:
         timestep: h [s].
@@ -53,5 +54,6 @@ def pull(timestep: float) -> tuple[float, float]:
         MuJoCo, Modeling, Solver parameters: k carries its impedance d here.
     """
     T, z = solref("implicitfast", timestep)
+    # solimp is flat at 0.9999 there, so that d does not depend on the gap.
     d = CONNECT["implicitfast"][1][1]
     return 1.0 / (d * (T * z) ** 2), 2.0 / (d * T)

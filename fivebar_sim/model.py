@@ -1,7 +1,7 @@
-"""The leg as a MuJoCo model: loads its MJCF and moves the numbers to a `FiveBar` and a scene.
+"""The leg as a MuJoCo model: loads its MJCF and sets the numbers of a `FiveBar` and a scene.
 
-The structure lives in models/leg.xml, and in models/scenes/, which attach it; nothing here rebuilds
-it.
+The structure lives in models/leg.xml, and in models/scenes/, whose files attach it; nothing here
+rebuilds it.
 """
 
 from __future__ import annotations
@@ -25,13 +25,13 @@ from fivebar_sim.kinematics.stops import stops_at_C
 from fivebar_sim.scenario.scenes import Ground, Payload, Scene, Treadmill, named
 
 JOINTS = ("A", "B", "E", "D")
-"""The joints in the order of qpos, and of every (..., 4) array of joint angles.
+"""The joints in the order of qpos and of every (..., 4) array of joint angles.
 
-On a rail hip_z comes before them: they are always the last four.
+On a rail hip_z comes first: the joints are always the last four.
 """
 
 HIP_HEIGHT = 1.3
-"""Height of a fixed hip above the floor, in leg sizes: the foot cannot touch."""
+"""Height of a fixed hip above the floor, in leg sizes: the foot cannot touch the floor."""
 
 
 def build(
@@ -46,20 +46,20 @@ def build(
     """Return the compiled model of a leg in a scene, closed in its rest pose.
 
     qpos ends with (theta_A, theta_B, theta_E, theta_D), and ctrl with (A, E). The keyframe `home`
-    is the rest pose, on a rail with the foot on the floor.
+    is the rest pose; on a rail the foot stands on the floor.
 
     Args:
         leg: The leg.
-        servo: Gains and limits of the servos at A and E; None leaves ideal joints: no damping,
-            no limit, the file's position gain.
-        scene: A scene, or the name of one with its defaults.
-        timestep: [s]; None is the file's.
+        servo: Gains and limits of the servos at A and E; None: no damping, no limit, and the
+            position gain of leg.xml.
+        scene: A scene, or its name for one with default values.
+        timestep: [s]; None: the one in the MJCF file.
         integrator: "discrete" or "implicitfast".
         drive: Whether ctrl is an angle or a torque.
 
     Raises:
         ArgumentError: Unknown scene, integrator or drive, or a timestep that is not positive.
-        GeometryError: A leg that MuJoCo does not compile, as one with next to no mass.
+        GeometryError: MuJoCo cannot compile the leg, for example because its mass is tiny.
     """
     placed = named(scene) if isinstance(scene, str) else scene
     spec = leg_spec(
@@ -109,9 +109,9 @@ def leg_spec(
     integrator: Integrator = "discrete",
     drive: Drive = "position",
 ) -> mujoco.MjSpec:
-    """Return leg.xml with the numbers of a leg, to compile or to attach by its body `hip`.
+    """Return leg.xml with the numbers of a leg, ready to compile or to attach by its body `hip`.
 
-    Arguments and errors are those of `build`; with a scene it is that scene's file.
+    Arguments and errors are those of `build`; with a scene it is the scene's file, leg included.
     """
     if integrator not in get_args(Integrator):
         raise ArgumentError(unknown("integrator", str(integrator), get_args(Integrator)))
@@ -155,7 +155,7 @@ def _load(spec: mujoco.MjSpec, leg: FiveBar, scene: Payload) -> None:
 
 
 def _stand(spec: mujoco.MjSpec, leg: FiveBar, scene: Ground, q: Array) -> None:
-    """Put the hip on the rail with its trunk, and in the keyframes the foot on the floor."""
+    """Put hip and trunk on the rail; in the keyframes the foot stands on the floor."""
     spec.body("hip").pos = (0.0, 0.0, 0.0)
     hip_z = spec.joint("hip_z")
     # With reference 0 the joint's coordinate is the hip's height above the floor itself.
@@ -172,7 +172,7 @@ def _stand(spec: mujoco.MjSpec, leg: FiveBar, scene: Ground, q: Array) -> None:
     spec.geom("foot").friction[0] = scene.friction
 
     if isinstance(scene, Treadmill):
-        # A belt that carries the foot backward: the leg stays where it is and walks forward.
+        # The belt runs backward, so the leg walks forward on the spot.
         spec.geom("floor").surfacevel = (-(scene.speed or 0.0), 0.0, 0.0, 0.0, 0.0, 0.0)
 
     for key in spec.keys:
@@ -181,14 +181,14 @@ def _stand(spec: mujoco.MjSpec, leg: FiveBar, scene: Ground, q: Array) -> None:
 
 
 def standing(leg: FiveBar, q: Array) -> float:
-    """Return the height of the hip frame's origin above the floor at which the foot touches it [m].
+    """Return the height of the hip frame's origin at which the foot just touches the floor [m].
 
     Args:
         leg: The leg.
         q: Joint angles [rad], (4,).
 
     Raises:
-        GeometryError: The foot is above the hip.
+        GeometryError: The foot is not below the hip.
     """
     height = leg.foot_radius - float(kinematics.chain_points(leg, q).F[1])
     if not height > 0.0:
@@ -206,7 +206,7 @@ def _place(spec: mujoco.MjSpec, leg: FiveBar, q: Array) -> None:
     origins = {"L1": A, "L2": (leg.L1, 0.0), "L4": E, "L3": (leg.L4, 0.0)}
     for (body, (x, z)), joint, angle in zip(origins.items(), JOINTS, q, strict=True):
         spec.body(body).pos = (x, 0.0, z)
-        # about -y, so that a positive angle turns +x to +z
+        # The joints turn about -y, so that a positive angle turns +x towards +z.
         spec.body(body).quat = (np.cos(angle / 2), 0.0, -np.sin(angle / 2), 0.0)
         spec.joint(joint).ref = angle
 
@@ -266,9 +266,9 @@ def _weigh(spec: mujoco.MjSpec, leg: FiveBar) -> None:
 
 
 def _explicit(body: mujoco.MjsBody, link: Link) -> None:
-    """Give a body the link's inertia. Out of the plane it is a slender rod along the link.
+    """Give a body the link's inertia; out of the plane it is that of a slender rod.
 
-    Only the moment about y moves the leg; the other two serve bodies that carry the leg.
+    Only the moment about y matters for the leg; the other two matter to a body that carries it.
     """
     along, across = link.com
     body.explicitinertial = True
@@ -278,7 +278,7 @@ def _explicit(body: mujoco.MjsBody, link: Link) -> None:
 
 
 def _drive(spec: mujoco.MjSpec, servo: Servo | None, drive: Drive) -> None:
-    """Set the motors at A and E: the law of `Servo`, or a bare motor, whose ctrl at rest is 0."""
+    """Set the motors at A and E: the law of `Servo`, or bare motors, whose ctrl at rest is 0."""
     for name in ("A", "E"):
         joint = spec.joint(name)
         actuator = spec.actuator(name)
@@ -289,7 +289,8 @@ def _drive(spec: mujoco.MjSpec, servo: Servo | None, drive: Drive) -> None:
             actuator.set_to_position(kp=servo.kp, kv=0.0 if servo.speed is None else servo.kd)
         if servo is None:
             continue
-        if servo.friction > 0.0:  # hard: with MuJoCo's own values a light joint does not stick
+        if servo.friction > 0.0:
+            # A hard constraint: with MuJoCo's default values a light joint does not stick.
             joint.frictionloss = servo.friction
             # Two timesteps is the shortest time constant that MuJoCo's solver keeps stable.
             joint.solref_friction = (2.0 * spec.option.timestep, 1.0)
@@ -303,7 +304,7 @@ def _drive(spec: mujoco.MjSpec, servo: Servo | None, drive: Drive) -> None:
 
 
 def _close(spec: mujoco.MjSpec, integrator: Integrator, q: Array) -> None:
-    """Set the loop's stiffness, and the stops of the angle at C around the rest pose's branch."""
+    """Set the loop's stiffness, and stops that keep the angle at C on the rest pose's branch."""
     connect = spec.equality("C")
     connect.solref = solref(integrator, spec.option.timestep)
     connect.solimp[:3] = CONNECT[integrator][1]

@@ -1,4 +1,4 @@
-"""What the leg shall do: the foot path at every step, and the joint angles that follow it."""
+"""The planned motion: the foot path at every step, and the joint angles that follow it."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from fivebar_sim.kinematics.stops import C_STOP, MOTOR_RANGE, angle_at_C, stops_
 from fivebar_sim.paths import FootPath, Sample
 
 KNEE_STOP = C_STOP
-"""How near to straight or folded the knees come where targets are projected [rad]: as near as the
-angle at C comes. At the edge itself a side chain is in line, and the joints' rates are infinite."""
+"""Least angle of a knee from straight or folded where targets are projected [rad], the same as for
+the angle at C. At the edge itself a side chain is in line, and the joints' rates are infinite."""
 
 FASTEST_SLIDE = 10.0
-"""How many times as fast as the path's targets their projections may move."""
+"""How many times faster than the path's targets their projections may move."""
 
 
 class Motion(NamedTuple):
@@ -28,7 +28,7 @@ class Motion(NamedTuple):
         time: [s], (N + 1,).
         foot: [m], (N + 1, 2); foot_dot and foot_ddot are its rates.
         q: (theta_A, theta_B, theta_E, theta_D) [rad], (N + 1, 4); q_dot and q_ddot are its rates.
-        force: What the world is expected to do to the foot [N], (N + 1, 2).
+        force: Expected force of the world on the foot [N], (N + 1, 2).
         payload: Point mass that the foot carries [kg].
     """
 
@@ -59,24 +59,26 @@ def plan(
 ) -> Motion:
     """Return the motion of a leg along a path, from the analytic inverse kinematics.
 
-    With `outside = "nearest"` targets out of reach become the nearest points in reach, those within
-    `edge_margin` of the workspace's edge included, so that the foot slides along the edge, less
-    that margin. If there are any, foot and joint rates are not the path's but those of `rates`.
+    With `outside = "nearest"`, targets out of reach, or within `edge_margin` of the workspace's
+    edge, are projected to the nearest point inside that margin, so that the foot slides along the
+    edge. If any target is projected, the rates of foot and joints come from `rates` instead of
+    from the path.
 
     Args:
         leg: The leg; it moves in its own working mode and assembly mode.
         path: The foot's path.
         steps: N.
         timestep: h [s].
-        force: What the world is expected to do to the foot [N], (N + 1, 2); None: nothing.
+        force: Expected force of the world on the foot [N], (N + 1, 2); None: zero.
         payload: Point mass that the foot carries [kg].
 
     Raises:
-        UnreachableError: Where the path leaves the workspace, where the leg's assembly mode does
-            not reach, or where a joint would pass its stop; says at what time, how far out and
-            what is nearest. Where a projected target jumps. `.index` is the step.
-        SingularError: Where a side chain is straight or folded on the way.
-        ArgumentError: Targets to be projected, for a leg with L6 > 0: it has no such margin.
+        UnreachableError: The path leaves the workspace, needs the other assembly mode, or drives
+            a joint past its stop; or a projected target jumps. The message says when and where,
+            and for a path out of the workspace how far out. `.index` is the step.
+        SingularError: A side chain is straight or folded somewhere on the path.
+        ArgumentError: Some target needs a projection and the leg has L6 > 0, for which no margin
+            is defined.
     """
     time: Array = np.arange(steps + 1, dtype=np.float64) * timestep
     wanted = path.at(time)
@@ -131,14 +133,14 @@ def poses(leg: FiveBar, foot: Array) -> Array:
 
 
 def edge_margin(leg: FiveBar) -> float:
-    """Return how far projected targets stay from the edge of the workspace [m].
+    """Return the distance that projected targets keep from the edge of the workspace [m].
 
-    At least so far that no knee comes nearer than g = KNEE_STOP to straight or folded: for both
-    sides, with l and m the links at the knee, the larger of
+    It keeps every knee at least g = KNEE_STOP away from straight and folded. It is the largest,
+    over both sides, with l and m the links at the knee, of
 
         l + m - sqrt(l^2 + m^2 + 2 l m cos g)   and   sqrt(l^2 + m^2 - 2 l m cos g) - |l - m|
 
-    but the first alone for l = m: such a side folds onto its motor's axis, inside the workspace.
+    For l = m only the first counts: such a side folds onto its motor's axis, inside the workspace.
 
     Args:
         leg: The leg; L6 = 0.
@@ -154,17 +156,17 @@ def edge_margin(leg: FiveBar) -> float:
 
 
 def rates(values: Array, timestep: float) -> tuple[Array, Array]:
-    """Return first and second rates of sampled values by central differences.
+    """Return first and second time derivatives of sampled values by central differences.
 
         v_k = (p_k+1 - p_k-1) / 2h,   a_k = (p_k+1 - 2 p_k + p_k-1) / h^2
 
-    At the first and the last row the values go on straight: the one-sided difference, and 0.
+    At both ends the values are extrapolated linearly: one-sided differences, and a = 0.
 
     Args:
         values: p at steps of h, (N + 1, n).
         timestep: h [s].
     """
-    # A row put in at either end, such that the central difference is one-sided there.
+    # One extrapolated row at either end makes the central difference one-sided there.
     before = 2.0 * values[:1] - values[1:2]
     after = 2.0 * values[-1:] - values[-2:-1]
     p = np.concatenate([before, values, after])
@@ -175,7 +177,7 @@ def _project(leg: FiveBar, wanted: Sample, time: Array) -> Sample:
     """Return the targets with those out of reach replaced; the same object if there are none."""
     targets = wanted.position
     if leg.L6 > 0.0:
-        # Nothing to project, so no margin is needed.
+        # Reachable targets need no projection, and so no margin.
         if workspace.reachable(leg, targets, mode=leg.mode).all():
             return wanted
         raise ArgumentError(f'outside = "nearest" needs a leg with L6 = 0, got {leg.L6:g} m')
@@ -185,7 +187,7 @@ def _project(leg: FiveBar, wanted: Sample, time: Array) -> Sample:
         return wanted
 
     moved = _lengths(np.diff(foot, axis=0))
-    # A jump from one edge to another is no slide: the motors could not follow it.
+    # A jump from one edge to another is not a slide: the motors could not follow it.
     fastest = _lengths(np.diff(targets, axis=0)).max()
     jumps = np.concatenate([[False], moved > FASTEST_SLIDE * fastest])
     what = f"moves the nearest reachable point more than {FASTEST_SLIDE:g} times as fast as itself"
@@ -199,7 +201,7 @@ def _lengths(vectors: Array) -> Array:
 
 
 def _continuous(rest: Array, q: Array) -> Array:
-    """Return angles without jumps, begun in the turn of the rest pose.
+    """Return angles without jumps by whole turns, starting near the rest pose.
 
     The knees stay within half a turn in any working mode; the motors may go round.
     """
@@ -221,7 +223,7 @@ def _in_turn(rest: Array, q: Array, begun: Array) -> Array:
     turns = np.zeros_like(begun)
     turns[..., [0, 2]] = turn * np.round((rest - begun) / turn)[..., [0, 2]]
     q = q + turns
-    # A and E got their turns each for itself; the stops decide which one E is really in.
+    # A and E were shifted separately; the stops at C decide which turn E is really in.
     middle = 0.5 * sum(stops_at_C(rest))
     q[:, 2] += turn * np.round((angle_at_C(begun + turns) - middle) / turn)
     return q
@@ -230,7 +232,7 @@ def _in_turn(rest: Array, q: Array, begun: Array) -> Array:
 def _check_stops(leg: FiveBar, rest: Array, foot: Array, time: Array, q: Array) -> None:
     low, high = stops_at_C(rest)
     angle = angle_at_C(q)
-    # The stops lie C_STOP before a singular pose: further on the angle has passed through it.
+    # A stop lies C_STOP before a singular pose: beyond that pose the assembly mode is the other.
     flipped = (angle < low - C_STOP) | (angle > high + C_STOP)
     _refuse(flipped, foot, time, f"needs the other assembly mode; the leg's is {leg.assembly:+d}")
     stopped = (angle < low) | (angle > high)

@@ -1,6 +1,6 @@
-"""The pytest plugin: the fixture `leg_run`, and what is kept of the runs of a test that fails.
+"""The pytest plugin: the fixture `leg_run`, which keeps the runs of a test that fails.
 
-Nothing heavy is imported before a test asks for the fixture: pytest loads this file every time.
+pytest loads this file every time, so heavy imports wait until a test asks for the fixture.
 """
 
 from __future__ import annotations
@@ -20,13 +20,13 @@ if TYPE_CHECKING:
     from fivebar_sim.rollout import Result
 
 RUNS: pytest.StashKey[list[Result]] = pytest.StashKey()
-"""The runs of a test, until it is over."""
+"""The runs of a test, until it ends."""
 
 PLAIN = re.compile(r"(?:\w+/)*\w+\.py(?:::\w+)+")
-"""A test's id whose folder tells it from all others as it stands."""
+"""Test ids that stay unique when they are turned into a folder's name."""
 
 LONGEST = 120
-"""Letters of a test's folder, before what tells it from others."""
+"""Longest name of a test's folder, without the hash that makes it unique."""
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -43,7 +43,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 def leg_run(request: pytest.FixtureRequest) -> LegRunner:
     """Run scenarios: `leg_run("trot.toml", controller=Mine()).assert_limits()`.
 
-    What a failed test ran is kept under --fivebar-artifacts, with pictures of its foot tracking.
+    The runs of a failed test are kept under --fivebar-artifacts, with pictures of foot tracking.
     """
     from fivebar_sim.regression.leg_run import LegRunner
 
@@ -55,34 +55,36 @@ def leg_run(request: pytest.FixtureRequest) -> LegRunner:
 def pytest_runtest_makereport(
     item: pytest.Item, call: pytest.CallInfo[None]
 ) -> Generator[None, pytest.TestReport, pytest.TestReport]:
-    """Keep the runs of a test that failed, and say where; forget those of one that is over."""
+    """Keep the runs of a failed test and report where; forget them when the test ends."""
     report = yield
     runs = item.stash.get(RUNS, [])
     if report.failed and runs:
         lines = [_keep(result, _folder(item), item.config) for result in runs]
         report.sections.append(("runs of the leg", "\n".join(lines)))
+    # A test can fail in its call and again in its teardown: its runs are written once.
     if report.failed or call.when == "teardown":
         runs.clear()
     return report
 
 
 def _folder(item: pytest.Item) -> Path:
-    """Return where the runs of a test are kept if it fails."""
+    """Return the folder for the runs of a test that fails."""
     artifacts = str(item.config.getoption("fivebar_artifacts"))
     return item.config.rootpath / artifacts / name_of(item.nodeid)
 
 
 def name_of(nodeid: str) -> str:
-    """Return what the folder of a test is called: a plain file name, no two tests have one."""
+    """Return the name of a test's folder: a plain file name, unique to the test."""
     name = re.sub(r"[^\w.]+", "-", nodeid)
     if PLAIN.fullmatch(nodeid) and len(name) <= LONGEST:
         return name
+    # Parameters may differ only in characters that no file name has, or past the cut.
     own = hashlib.sha256(nodeid.encode("utf-8", "backslashreplace")).hexdigest()[:10]
     return f"{name[:LONGEST].strip('-.')}-{own}"
 
 
 def _clear(folder: Path) -> None:
-    """Delete the runs that an earlier failure of a test left; anything else stays."""
+    """Delete the runs of an earlier failure of a test; anything else stays."""
     if not folder.is_dir():
         return
     from fivebar_sim.runs import directory
@@ -95,7 +97,7 @@ def _clear(folder: Path) -> None:
 
 
 def _keep(result: Result, folder: Path, config: pytest.Config) -> str:
-    """Write a run directory with its pictures; return the line that says where it is."""
+    """Write a run directory with its pictures; return a line that says where it is."""
     name = result.scenario.name
     places = (folder / (f"{name}-{number}" if number > 1 else name) for number in count(1))
     place = next(place for place in places if not place.exists())
@@ -104,7 +106,8 @@ def _keep(result: Result, folder: Path, config: pytest.Config) -> str:
     try:
         result.write(place)
         files = ["recording.rrd", *_draw(result, place)]
-    except Exception as error:  # what a hook raises would end the whole session
+    # An error raised in a hook would end the whole pytest session.
+    except Exception as error:
         return f"{name}: {result.verdict}, but cannot all be kept in {shown}: {error}"
     return f"{name}: {result.verdict}, kept in {shown} ({', '.join(files)})"
 

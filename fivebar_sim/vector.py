@@ -20,24 +20,24 @@ from fivebar_sim.tasks.legs import LegGroup
 
 
 class LegVectorEnv(VectorEnv[Array, Array, Any]):
-    """Legs at one task, stepped together; leg i has the bits of `LegEnv` of the same seeds.
+    """Many legs with one task, stepped together; leg i equals a `LegEnv` of its seeds bit for bit.
 
     That is LegEnv(task, randomise=randomise, model_seed=model_seed + i), reset with seed + i, or
-    with the i-th of the seeds. A leg whose episode is over begins a new one in the next step, whose
-    action it ignores (Gymnasium's next-step autoreset). info has the reward's "terms" by name and
-    the "reason" of each end, "" elsewhere.
+    with the i-th of the seeds. A leg whose episode ended begins a new one in the next step and
+    ignores that step's action (Gymnasium's next-step autoreset). info has the reward's "terms" by
+    name and the "reason" of each end, "" for the other legs.
 
     Args:
         task: "track", "stand", "hop", "gait", or a Task.
         num_envs: Number of legs n.
-        nthread: Threads; 0 is one for every processor.
-        randomise: Ranges of what each leg draws, once; None is nothing.
-        model_seed: Leg i draws from model_seed + i.
-        options: Of the task: leg, servo, action, period ...
+        nthread: Number of threads; 0: one for every processor.
+        randomise: Ranges of each leg's random parameters, drawn once; None: no randomisation.
+        model_seed: Leg i draws its parameters with the seed model_seed + i.
+        options: The task's keywords: leg, servo, action, period ...
 
     Raises:
         ArgumentError: Unknown task or option, or less than one leg.
-        UnreachableError: A drawn leg cannot follow the path.
+        UnreachableError: A leg with its random lengths cannot follow the path.
     """
 
     metadata = {  # noqa: RUF012 - as in VectorEnv
@@ -78,19 +78,21 @@ class LegVectorEnv(VectorEnv[Array, Array, Any]):
         """Return the first observations (n, size) and info.
 
         Args:
-            seed: Leg i's is seed + i, or the i-th; None goes on with the last ones.
-            options: There are none.
+            seed: Leg i gets seed + i, or the i-th of a sequence; None: continue with the last
+                ones.
+            options: Unused.
 
         Raises:
-            gymnasium.error.Error: A seed that is no whole number from 0 on.
-            ArgumentError: Not as many seeds as legs.
+            gymnasium.error.Error: A seed is not a whole number >= 0.
+            ArgumentError: The number of seeds is not that of the legs.
         """
         if seed is None:
             seeds: list[int | None] = [None] * self.num_envs
         elif isinstance(seed, Sequence):
             seeds = list(seed)
         else:
-            seeding.np_random(seed)  # refuses what is no seed
+            # Called for its error: adding i to something that is no number raises another one.
+            seeding.np_random(seed)
             seeds = [seed + i for i in range(self.num_envs)]
 
         if len(seeds) != self.num_envs:
@@ -107,7 +109,7 @@ class LegVectorEnv(VectorEnv[Array, Array, Any]):
         """Return observations, rewards, terminations, truncations and info.
 
         Raises:
-            ArgumentError: Actions that are none of the action space.
+            ArgumentError: Some action is not in the action space.
         """
         values = self.episodes.check_action(actions, (self.num_envs, len(self.episodes.low)))
         outcome = self._group.step(values)

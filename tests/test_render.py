@@ -161,7 +161,7 @@ def test_camera_sees_all_of_the_motion() -> None:
     shown = posed(FiveBar.load("classic"))
     for aspect in (0.3, 1.0, 3.0):
         camera = render_scene.fit(shown, aspect)
-        seen = shown.fitted()
+        seen = shown.points_to_fit()
         ray = np.stack([seen[:, 0], 0.0 * seen[:, 0], seen[:, 1]], axis=-1) - camera.eye
         depth = ray @ camera.forward
         tangent = np.tan(np.radians(0.5 * camera.field))
@@ -241,7 +241,7 @@ REFUSED = [
     (("--fps", "60"), "fps must be in [0.1, 50] 1/s, got 60.0"),
     (("--speed", "nan"), "speed must be in [0.0001, 10000], got nan"),
     (("--out", "a.png", "--at", "9"), "at must be in [0, 0.6] s, got 9.0"),
-    (("--at", "0.3"), "at is the moment of a .png, and short.gif is none"),
+    (("--at", "0.3"), "at is the time of a single .png, got short.gif"),
     (("--speed", "1e-4"), "a .gif of 640 x 480 may have up to 813 frames, got 75000"),
     (("--out", "no/leg.gif"), "cannot write no/leg.gif: No such file or directory"),
     (("--out", "mine.gif"), "cannot write mine.gif: a directory is there"),

@@ -105,8 +105,8 @@ def test_a_leg_is_held_in_its_rest_pose(opened: list[Window]) -> None:
 def test_the_command_shows_what_is_named(shell: Shell, opened: list[Window]) -> None:
     (shell.folder / "leg.toml").write_text("L1 = 0.04\nL2 = 0.06\nL3 = 0.06\nL4 = 0.04\nL5 = 0.03")
     for source, kind in (("doggo", FiveBar), ("leg.toml", FiveBar), ("short.toml", Scenario)):
-        assert isinstance(view.chosen(source), kind)
-    assert isinstance(view.chosen("rail-hop"), Scenario)
+        assert isinstance(view.load(source), kind)
+    assert isinstance(view.load("rail-hop"), Scenario)
     assert shell("view", "leg.toml").status == 0
     assert shell("view", "short.toml").status == 0
     assert len(opened) == 2

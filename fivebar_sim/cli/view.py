@@ -12,20 +12,21 @@ from fivebar_sim.cli.common import working
 def view(
     source: Positional[Annotated[str, arg(metavar="[LEG|SCENARIO]")]] = "classic-ellipse", /
 ) -> int:
-    """Open MuJoCo's viewer: a scenario's run in real time, or a leg to move by its sliders.
+    """Open MuJoCo's viewer: a scenario's run in real time, or a leg that its sliders move.
 
-    A scenario is simulated first, then its states are shown, over and over. A leg stands in its
-    rest pose, and the sliders turn its servos.
+    A scenario is simulated first, then shown over and over. A leg starts in its rest pose, and the
+    sliders command its servos.
 
     Args:
-        source: A scenario or a leg: a shipped name or a TOML file.
+        source: A scenario or a leg, by its shipped name or as a TOML file.
     """
     from fivebar_sim import rollout
     from fivebar_sim.geometry import FiveBar
     from fivebar_sim.render import screen, view
     from fivebar_sim.render.replay import replay
 
-    what = view.chosen(source)
+    what = view.load(source)
+    # Before the simulation, which would be for nothing without a screen.
     screen.check(view.INSTEAD)
     if isinstance(what, FiveBar):
         view.hold(what)

@@ -1,1 +1,1 @@
-"""Pictures of MuJoCo's: films, a leg, the interactive viewer."""
+"""Pictures by MuJoCo: films of runs, pictures of a leg, the interactive viewer."""

@@ -1,6 +1,6 @@
-"""A run as a GIF, a film or a picture, by MuJoCo's own renderer, with or without a screen.
+"""Draw a run as a GIF, a film or a picture, with MuJoCo's renderer, with or without a screen.
 
-The record's qpos is shown, through `mj_forward`; nothing is simulated again.
+The poses come from the record's qpos; nothing is simulated again.
 """
 
 from __future__ import annotations
@@ -23,26 +23,26 @@ from fivebar_sim.render.replay import Replay, Span
 
 FORMATS = (".gif", ".mp4", ".png")
 FASTEST = {".gif": 50.0, ".mp4": 240.0, ".png": 240.0}
-"""Most frames a second; viewers slow a GIF down that has more [1/s]."""
+"""Highest frame rate [1/s]; viewers slow down a GIF with more frames a second."""
 LEAST = 64
 MOST = 4096
-"""Pixels along a side."""
+"""Least and greatest width and height [pixels]."""
 MOST_GIF = 250_000_000
 MOST_FRAMES = 100_000
-"""Pixels of all of a GIF's frames, which are held in memory; frames of a film, which are not."""
+"""Most pixels of all frames of a GIF, which are held in memory; most frames of a film."""
 SAMPLES = 8
-"""Frames that a GIF's palette is made for."""
+"""Number of frames from which a GIF's palette is made, at most."""
 
 
 class Film(NamedTuple):
-    """How a run is shown.
+    """How to draw a run.
 
     Attributes:
-        width: Of the picture [pixels].
-        height: [pixels].
+        width: Width of the picture [pixels].
+        height: Height of the picture [pixels].
         fps: Frames a second.
-        speed: Of the run's time over the clock's; 1 is real time.
-        at: Moment of a single picture [s]; None is the middle of the run.
+        speed: Simulated time over the time on screen; 1 is real time.
+        at: Time of a single picture [s]; None: the middle of the run.
     """
 
     width: int = 640
@@ -53,10 +53,10 @@ class Film(NamedTuple):
 
 
 def span(replay: Replay, suffix: str) -> Span:
-    """Return the part of a run that a kind of file shows.
+    """Return the part of a run that is drawn into a file with this suffix.
 
-    A GIF shows the last whole period of a periodic path, so that it starts over without a jump;
-    a film shows all of the run, as does the GIF of another path.
+    A GIF shows the last whole period of a periodic path, so that it repeats without a jump. A film,
+    and the GIF of a path that is not periodic, show the whole run.
     """
     return replay.cycle if suffix == ".gif" else replay.whole
 
@@ -64,17 +64,17 @@ def span(replay: Replay, suffix: str) -> Span:
 def moments(part: Span, film: Film) -> list[float]:
     """Return the times of the frames [s], evenly spaced from the start, without the end.
 
-    There are length fps / speed of them, rounded, and one at least.
+    Their number is length fps / speed, rounded, and at least one.
     """
     count = max(1, round(part.length * film.fps / film.speed))
     return [part.start + part.length * k / count for k in range(count)]
 
 
 def check(replay: Replay, out: Path, film: Film) -> None:
-    """Raise unless a run can be shown like this.
+    """Raise unless a run can be drawn like this.
 
     Raises:
-        ConfigError: An unknown kind of file, or a number out of its range.
+        ConfigError: An unknown kind of file, or a number out of range.
     """
     kind = out.suffix.lower()
     if kind not in FORMATS:
@@ -85,12 +85,13 @@ def check(replay: Replay, out: Path, film: Film) -> None:
     for name in ("width", "height"):
         pixels = getattr(film, name)
         check_number(name, pixels, "pixels", low=LEAST, high=MOST, error=ConfigError)
+        # yuv420p, which every player reads, halves the colours' resolution in both directions.
         if kind == ".mp4" and pixels % 2:
             raise ConfigError(f"{name} of a .mp4 must be even, got {pixels}")
 
     if film.at is not None:
         if kind != ".png":
-            raise ConfigError(f"at is the moment of a .png, and {out} is none")
+            raise ConfigError(f"at is the time of a single .png, got {out}")
         check_number("at", film.at, "s", low=0.0, high=replay.duration, error=ConfigError)
 
     wanted = span(replay, kind).length * film.fps / film.speed
@@ -98,20 +99,20 @@ def check(replay: Replay, out: Path, film: Film) -> None:
     if kind != ".png" and not wanted <= most:
         raise ConfigError(
             f"a {kind} of {film.width} x {film.height} may have up to {most} frames, got "
-            f"{wanted:.0f}: take fewer a second, a higher speed or another kind of file"
+            f"{wanted:.0f}: use a lower fps, a higher speed or another kind of file"
         )
 
 
 def write(replay: Replay, out: Path, film: Film) -> int:
-    """Draw a run into a file, written beside and renamed; return the number of frames.
+    """Draw a run into a file, which appears only when it is complete; return the number of frames.
 
     Args:
         replay: The run.
         out: The file; .gif, .mp4 or .png.
-        film: How it is shown.
+        film: How to draw it.
 
     Raises:
-        ConfigError: What `check` refuses, no GL or no ffmpeg here, or a file that cannot be
+        ConfigError: `check` refuses it, there is no GL or no ffmpeg, or the file cannot be
             written.
     """
     check(replay, out, film)
@@ -123,12 +124,14 @@ def write(replay: Replay, out: Path, film: Film) -> int:
         times = [0.5 * replay.duration if film.at is None else film.at]
 
     with whole_file.beside(out) as place, stage(replay, film.width, film.height) as drawn:
+        # A generator: a film of 100,000 frames would not fit into memory.
         frames = (drawn.frame(time) for time in times)
         if kind == ".png":
             render_files.write_png(place, next(frames))
         elif kind == ".mp4":
             render_files.write_mp4(place, frames, film.fps)
         else:
+            # Evenly over the film, so that colours that show only at times are in the palette.
             sample = (drawn.frame(time) for time in times[:: -(-len(times) // SAMPLES)])
             shown = render_files.durations(len(times), part.length / film.speed)
             render_files.write_gif(place, frames, sample, shown)
@@ -136,12 +139,12 @@ def write(replay: Replay, out: Path, film: Film) -> int:
 
 
 class Stage:
-    """Where a run is drawn: a GL context, the scene and its camera.
+    """A GL context with a scene and a camera, which draws the moments of a run.
 
     Args:
         replay: The run.
-        width: Of the picture [pixels].
-        height: [pixels].
+        width: Width of the picture [pixels].
+        height: Height of the picture [pixels].
     """
 
     def __init__(self, replay: Replay, width: int, height: int) -> None:
@@ -150,6 +153,7 @@ class Stage:
         self._rect = mujoco.MjrRect(0, 0, width, height)
         scene.dress(replay, self.camera, max(width, height))
         model = replay.model
+        # MjrContext allocates its offscreen buffer by these, so they are set before it is made.
         model.vis.global_.offwidth = width
         model.vis.global_.offheight = height
         self._data = mujoco.MjData(model)
@@ -166,10 +170,11 @@ class Stage:
             self._gl.free()
             raise ConfigError(f"cannot draw {width} x {height} pixels here: {error}") from None
 
+        # The default target is a window, and there is none.
         mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN, self._mjr)
 
     def frame(self, time: float) -> Frame:
-        """Return the picture of a moment of the run [s], (height, width, 3)."""
+        """Return the picture of the run at a time [s], (height, width, 3)."""
         row = self._replay.row(time)
         model = self._replay.model
         data = self._data
@@ -178,25 +183,27 @@ class Stage:
         every = mujoco.mjtCatBit.mjCAT_ALL
         mujoco.mjv_updateScene(model, data, self._option, None, self._view, every, self.scene)
         scene.decorate(self.scene, self._replay, row, self.camera.eye)
+        # Another stage of this thread may have made its own context current since.
         self._gl.make_current()
         mujoco.mjr_render(self._rect, self.scene, self._mjr)
         pixels = np.empty((self._rect.height, self._rect.width, 3), np.uint8)
         mujoco.mjr_readPixels(pixels, None, self._rect, self._mjr)
 
-        return np.ascontiguousarray(pixels[::-1])  # GL's rows go up
+        # GL counts rows from the bottom, image files from the top.
+        return np.ascontiguousarray(pixels[::-1])
 
     def close(self) -> None:
-        """Let go of the GL context."""
+        """Free the GL context."""
         self._mjr.free()
         self._gl.free()
 
 
 @contextmanager
 def stage(replay: Replay, width: int, height: int) -> Iterator[Stage]:
-    """Give a stage, closed at the end.
+    """Open a stage and close it at the end.
 
     Raises:
-        ConfigError: There is no GL here.
+        ConfigError: There is no working GL.
     """
     opened = Stage(replay, width, height)
     try:

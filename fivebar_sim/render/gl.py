@@ -1,7 +1,7 @@
-"""A GL to draw with, without a screen: EGL, or else OSMesa; found by trying.
+"""OpenGL without a screen: EGL, or else OSMesa, whichever works.
 
-`mujoco.Renderer` takes the one that MUJOCO_GL named when mujoco was first imported, and without
-that one that needs a screen. Here the context is chosen when it is asked for.
+`mujoco.Renderer` uses what MUJOCO_GL said when mujoco was first imported, and by default a GL that
+needs a screen. Here the choice is made when a context is requested.
 """
 
 from __future__ import annotations
@@ -16,8 +16,7 @@ from typing import Any
 from fivebar_sim.errors import ConfigError
 
 WAYS = {"egl": "libegl1", "osmesa": "libosmesa6"}
-"""MuJoCo's names of what draws without a screen on Linux, the first is tried first; each with its
-Debian package."""
+"""MuJoCo's names for GL without a screen on Linux, in the order of trial, with Debian packages."""
 
 TRIAL = """
 import mujoco
@@ -30,25 +29,26 @@ mujoco.MjrContext(mujoco.MjModel.from_xml_string("<mujoco/>"), 100)
 
 @cache
 def works(way: str) -> bool:
-    """Return whether one of `WAYS` draws here.
+    """Return whether one of `WAYS` can draw on this machine.
 
-    It is tried in a process of its own: a failed one cannot be undone within a process, nor can
-    a driver that crashes.
+    It is tried in a separate process: a failed attempt cannot be undone within a process, and a
+    driver may crash.
     """
     trial = [sys.executable, "-c", TRIAL.format(way=way)]
     try:
         return subprocess.run(trial, capture_output=True, timeout=60).returncode == 0
+    # A driver that hangs is as useless as one that fails.
     except subprocess.TimeoutExpired:
         return False
 
 
 def find() -> str:
-    """Return the first of `WAYS` that works; on other systems than Linux "native", MuJoCo's own.
+    """Return the first of `WAYS` that works; on systems other than Linux "native", MuJoCo's own.
 
-    MUJOCO_GL may name one: then it is that one or none.
+    If MUJOCO_GL names one of them, only that one is tried.
 
     Raises:
-        ConfigError: None works; names the Debian packages.
+        ConfigError: None of them works; the message names the Debian packages.
     """
     if sys.platform != "linux":
         return "native"
@@ -73,35 +73,37 @@ def find() -> str:
 
 
 def context(way: str, width: int, height: int) -> Any:
-    """Return MuJoCo's GL context for pictures of a size in pixels; it has make_current and free.
+    """Return MuJoCo's GL context, an object with make_current and free.
 
     Args:
         way: What `find` returned.
-        width: [pixels].
-        height: [pixels].
+        width: Width of the pictures [pixels].
+        height: Height of the pictures [pixels].
 
     Raises:
-        ConfigError: OpenGL was loaded for something else before, as dm_control does it.
+        ConfigError: OpenGL was already loaded with another platform, as dm_control may do.
     """
     module = "mujoco.gl_context" if way == "native" else f"mujoco.{way}"
     try:
+        # The import loads OpenGL for this platform, which a process can do only once.
         return importlib.import_module(module).GLContext(width, height)
     except ImportError as error:
         raise ConfigError(
-            f"cannot draw: OpenGL is loaded for something else than {way} in this process; set "
+            f"cannot draw: OpenGL is already loaded for another platform than {way}; set "
             f"MUJOCO_GL={way} before anything is imported"
         ) from error
 
 
-def settle() -> None:
-    """Let what is imported later draw as we do where there is no screen: set MUJOCO_GL.
+def set_mujoco_gl() -> None:
+    """Set MUJOCO_GL where there is no screen, so that later imports use the GL that works.
 
-    dm_control would otherwise load OpenGL for a screen, and no process can load it twice.
+    dm_control would otherwise load OpenGL for a screen, and a process can load it only once.
     """
     screen = any(os.environ.get(name) for name in ("DISPLAY", "WAYLAND_DISPLAY"))
     if sys.platform != "linux" or screen or os.environ.get("MUJOCO_GL"):
         return
     try:
         os.environ["MUJOCO_GL"] = find()
+    # Without any GL dm_control can still simulate, if it does not look for one.
     except ConfigError:
         os.environ["MUJOCO_GL"] = "disable"

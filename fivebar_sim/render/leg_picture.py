@@ -1,4 +1,4 @@
-"""Pictures of a leg that is somewhere, without a run or a screen."""
+"""Pictures of a leg in a pose, without a run or a screen."""
 
 from __future__ import annotations
 
@@ -16,21 +16,21 @@ from fivebar_sim.render import gl
 WIDTH = 640
 HEIGHT = 480
 GEOMS = 200
-"""Room of a scene."""
+"""Most geoms of a scene."""
 FAR = 3.5
 DOWN = -9.0
-"""Where the camera is: distance from the hip in leg sizes, and elevation [degrees]."""
+"""Position of the camera: distance in leg sizes, and elevation [degrees]."""
 
 
 class LegPicture:
-    """What takes pictures of a leg: a GL context, a scene and its camera.
+    """A GL context with a scene and a camera, which takes pictures of a leg.
 
     Args:
-        model: The leg's.
+        model: The leg's model.
         leg: The leg.
 
     Raises:
-        ConfigError: There is no GL here.
+        ConfigError: There is no working GL.
     """
 
     def __init__(self, model: mujoco.MjModel, leg: FiveBar) -> None:
@@ -46,20 +46,23 @@ class LegPicture:
         self._camera.elevation = DOWN
         self._camera.distance = FAR * leg.size
         self._gl = gl.context(gl.find(), WIDTH, HEIGHT)
-        self._freed = weakref.finalize(self, self._gl.free)  # at the latest before Python ends
+        # A finalizer runs before Python unloads its modules; `__del__` may come too late for GL.
+        self._free = weakref.finalize(self, self._gl.free)
 
         try:
             self._gl.make_current()
             self._mjr = mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_100)
         except mujoco.FatalError as error:
-            self._freed()
+            self._free()
             raise ConfigError(f"cannot draw {WIDTH} x {HEIGHT} pixels here: {error}") from None
 
+        # The default target is a window, and there is none.
         mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN, self._mjr)
 
-    def taken(self, qpos: Array) -> NDArray[np.uint8]:
+    def take(self, qpos: Array) -> NDArray[np.uint8]:
         """Return the picture of a pose (nq,), (HEIGHT, WIDTH, 3)."""
         self._data.qpos[:] = qpos
+        # Positions are all that a picture needs; mj_forward would solve for forces too.
         mujoco.mj_kinematics(self._model, self._data)
         mujoco.mj_camlight(self._model, self._data)
         self._camera.lookat[:] = self._data.body("hip").xpos - (0.0, 0.0, 0.4 * self._size)
@@ -72,9 +75,10 @@ class LegPicture:
         pixels = np.empty((HEIGHT, WIDTH, 3), np.uint8)
         mujoco.mjr_readPixels(pixels, None, self._rect, self._mjr)
 
-        return np.ascontiguousarray(pixels[::-1])  # GL's rows go up
+        # GL counts rows from the bottom, image files from the top.
+        return np.ascontiguousarray(pixels[::-1])
 
     def close(self) -> None:
-        """Let go of the GL context."""
+        """Free the GL context."""
         self._mjr.free()
-        self._freed()
+        self._free()

@@ -1,6 +1,7 @@
-"""Marks that are drawn into a scene of MuJoCo's: bars, arrows, balls and pins.
+"""Marks in a MuJoCo scene: bars, arrows, balls and pins.
 
-Marks are moved towards the eye, along their rays: they hide the links and stay in place.
+Each mark is moved towards the eye along its line of sight: it appears at the same place, but in
+front of the links.
 """
 
 from __future__ import annotations
@@ -19,9 +20,9 @@ class Pen:
     """Adds geoms to a scene.
 
     Args:
-        scene: That they are added to.
-        eye: [m], (3,).
-        front: How far things are moved towards the eye [m].
+        scene: The scene.
+        eye: Position of the camera [m], (3,).
+        front: How far marks are moved towards the eye [m].
     """
 
     def __init__(self, scene: mujoco.MjvScene, eye: Array, front: float) -> None:
@@ -30,7 +31,7 @@ class Pen:
         self._front = front
 
     def before(self, points: Array, times: float = 1.0) -> Array:
-        """Return points (x, z) of the leg plane in front of it, (..., 2) to (..., 3)."""
+        """Return points (x, z) of the leg plane moved in front of it, (..., 2) to (..., 3)."""
         space = np.stack([points[..., 0], np.zeros(points.shape[:-1]), points[..., 1]], axis=-1)
         ray = self._eye - space
         return space + times * self._front * ray / np.linalg.norm(ray, axis=-1, keepdims=True)
@@ -50,7 +51,7 @@ class Pen:
         geom.pos[:] = centre
 
     def pin(self, centre: Array, radius: float, colour: Colour) -> None:
-        """Add a disc that faces +-y."""
+        """Add a disc that faces the camera, along y."""
         across = np.array([0.0, 0.1 * radius, 0.0])
         kind = mujoco.mjtGeom.mjGEOM_CYLINDER
         self._connect(kind, centre - across, centre + across, radius, colour)
@@ -64,6 +65,7 @@ class Pen:
         """Return the scene's next geom."""
         geom = self._scene.geoms[self._scene.ngeom]
         rgba = np.array([*colour, 1.0], np.float32)
+        # Size, position and orientation are placeholders: the caller sets them.
         mujoco.mjv_initGeom(geom, kind, np.ones(3), np.zeros(3), np.eye(3).ravel(), rgba)
         geom.category = mujoco.mjtCatBit.mjCAT_DECOR
         geom.emission = 0.15

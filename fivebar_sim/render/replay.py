@@ -1,4 +1,4 @@
-"""A run as it is drawn: the model, its qpos in every row, and which rows make a film."""
+"""A run to draw: the model, its qpos in every row, and the rows that make a film."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from fivebar_sim.scenario import Scenario
 from fivebar_sim.scenario.scenes import Ground, Treadmill
 
 FITTED = 600
-"""Poses that the camera is fitted to; of a longer run every so-manieth row."""
+"""Most poses that the camera is fitted to; of a longer run every n-th row is used."""
 
 
 class Span(NamedTuple):
-    """A part of a run, [s]."""
+    """A part of a run: start and length [s]."""
 
     start: float
     length: float
@@ -29,14 +29,14 @@ class Replay(NamedTuple):
     """A run to draw; row k of every array is the state at t = (k + 1) h.
 
     Attributes:
-        scenario: What was run.
-        model: Of the scene.
-        qpos: (N, nq).
+        scenario: The scenario that was run.
+        model: MuJoCo's model of leg and scene.
+        qpos: MuJoCo's coordinates, (N, nq).
         hip: Height of the hip frame's origin above the floor [m], (N,).
         foot: F in the hip frame [m], (N, 2).
-        target: Where F should be [m], (N, 2).
+        target: Target of F [m], (N, 2).
         ground: Force of the ground on the foot [N], (N, 2); zero in the air.
-        belt: How far a treadmill's belt has come [m], (N,); None without one.
+        belt: Travel of a treadmill's belt [m], (N,); None without a belt.
     """
 
     scenario: Scenario
@@ -50,12 +50,12 @@ class Replay(NamedTuple):
 
     @property
     def rows(self) -> int:
-        """N."""
+        """Number of rows N."""
         return len(self.qpos)
 
     @property
     def duration(self) -> float:
-        """N h [s]."""
+        """Duration N h [s]."""
         return self.rows * self.scenario.sim.timestep
 
     def row(self, time: float) -> int:
@@ -65,22 +65,24 @@ class Replay(NamedTuple):
 
     @property
     def whole(self) -> Span:
-        """All of the run."""
+        """The whole run."""
         return Span(0.0, self.duration)
 
     @property
     def cycle(self) -> Span:
-        """The last whole period of a periodic path, which loops; all of another run."""
+        """The last whole period of a periodic path, which repeats; otherwise the whole run."""
         period = self.scenario.path.period
         window = self.scenario.window
         if period is None:
             return self.whole
         return Span(window.stop * self.scenario.sim.timestep - period, period)
 
-    def fitted(self) -> Array:
-        """Return (x, z) of all joints, feet and targets that the camera must see [m], (n, 2)."""
+    def points_to_fit(self) -> Array:
+        """Return (x, z) of the joints, feet and targets that the camera must see [m], (n, 2)."""
+        # Rounded up, so that there are at most FITTED poses.
         some = slice(None, None, -(-self.rows // FITTED))
         hip = np.stack([np.zeros_like(self.hip[some]), self.hip[some]], axis=-1)
+        # On a rail qpos begins with the hip's height; the joints are always the last four.
         points = kinematics.chain_points(self.scenario.leg, self.qpos[some, -4:])
         bases = (np.broadcast_to(base, hip.shape) for base in kinematics.bases(self.scenario.leg))
         seen = np.stack([*bases, *points, self.target[some]])
@@ -88,10 +90,10 @@ class Replay(NamedTuple):
 
 
 def replay(scenario: Scenario, record: Record) -> Replay:
-    """Return a run as it is drawn.
+    """Return a run, ready to draw.
 
     Raises:
-        RunDirectoryError: The record lacks a column of its scene.
+        RunDirectoryError: The record lacks a column that its scene needs.
     """
     grounded = isinstance(scenario.scene, Ground)
     belted = isinstance(scenario.scene, Treadmill)
@@ -99,7 +101,7 @@ def replay(scenario: Scenario, record: Record) -> Replay:
     for name in wanted:
         if name not in record:
             raise RunDirectoryError(
-                f"no record of the scene {scenario.scene.kind!r}: it lacks the column {name}"
+                f"not a record of the scene {scenario.scene.kind!r}: it lacks the column {name}"
             )
 
     q = np.stack([record[name] for name in JOINT_COLUMNS], axis=-1)

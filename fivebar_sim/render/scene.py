@@ -1,7 +1,7 @@
-"""What is drawn of a run: the leg, its target path, the foot's trail, the force of the ground.
+"""The picture of a run: the leg, its target path, the foot's trail, the force of the ground.
 
-The hip frame's (x, z) is the world's (x, 0, z) over the hip; the camera looks along +y. Lines and
-marks are moved towards the eye, along their rays: they hide the links and stay in place.
+The hip frame's (x, z) is (x, 0, z) from the hip in the world; the camera looks along +y. Lines and
+marks are drawn in front of the links (see `Pen`).
 """
 
 from __future__ import annotations
@@ -19,17 +19,17 @@ from fivebar_sim.render.replay import Replay
 
 FIELD = 20.0
 DOWN = 9.0
-"""Of the camera: vertical field of view, and how far it looks down [degrees]."""
+"""The camera's vertical field of view, and how far it looks down [degrees]."""
 MARGIN = 1.08
-"""The picture's size over that of the motion."""
+"""Size of the picture relative to that of the motion."""
 TRAIL_SECONDS = 0.5
-"""How long the trail of the foot stays [s]; never all of a period, or it would hide the path."""
+"""Duration of the foot's trail [s]; always less than a period, or it would hide the path."""
 PATH_PARTS = 160
 TRAIL_PARTS = 60
 SLATS = 8
-"""Marks on a belt to either side of the leg."""
+"""Number of marks on a belt to either side of the leg."""
 GEOMS = 2000
-"""Room of a scene."""
+"""Most geoms of a scene."""
 
 GREEN = (0.12, 0.60, 0.30)
 RED = (0.84, 0.16, 0.24)
@@ -40,11 +40,11 @@ PIN = (0.90, 0.91, 0.93)
 
 
 class Camera(NamedTuple):
-    """Where the picture is taken from.
+    """Position and field of view of the camera.
 
     Attributes:
-        centre: What it looks at [m], (3,).
-        distance: From there [m].
+        centre: Point that it looks at [m], (3,).
+        distance: Distance from that point [m].
         field: Vertical field of view [degrees].
     """
 
@@ -54,16 +54,16 @@ class Camera(NamedTuple):
 
     @property
     def forward(self) -> Array:
-        """Unit vector of its view, (3,)."""
+        """Unit vector along the line of sight, (3,)."""
         return np.array([0.0, np.cos(np.radians(DOWN)), -np.sin(np.radians(DOWN))])
 
     @property
     def eye(self) -> Array:
-        """Where it is [m], (3,)."""
+        """Position of the camera [m], (3,)."""
         return self.centre - self.distance * self.forward
 
     def aim(self, camera: mujoco.MjvCamera) -> None:
-        """Set a free camera of MuJoCo; its field of view is the model's."""
+        """Set position and direction of MuJoCo's free camera; the model has the field of view."""
         camera.type = mujoco.mjtCamera.mjCAMERA_FREE
         camera.lookat[:] = self.centre
         camera.distance = self.distance
@@ -75,22 +75,24 @@ def fit(replay: Replay, aspect: float) -> Camera:
     """Return the camera that sees the whole motion.
 
     A point p (about the centre) is in the picture if |p . right| <= (d + p . forward) tan(h / 2),
-    h the horizontal field, and likewise up: d is the least distance at which all are.
+    with h the horizontal field, and likewise vertically. d is the least distance at which all are.
 
     Args:
         replay: The run.
         aspect: Width over height of the picture.
     """
     leg = replay.scenario.leg
-    seen = replay.fitted()
+    seen = replay.points_to_fit()
     points = np.stack([seen[:, 0], np.zeros(len(seen)), seen[:, 1]], axis=-1)
     probe = Camera(np.zeros(3), 1.0, FIELD)
     right = np.array([1.0, 0.0, 0.0])
     up = np.cross(right, probe.forward)
+    # The points are axes and centres; links and foot reach beyond them.
     pad = leg.foot_radius + 2.0 * leg.radius
     middle = [0.5 * float((points @ n).min() + (points @ n).max()) for n in (right, up)]
     centre = middle[0] * right + middle[1] * up
     depth = points @ probe.forward
+    # A smaller tangent than the camera's leaves the margin.
     tangent = np.tan(np.radians(0.5 * FIELD)) / MARGIN
     needed = [
         (np.abs((points - centre) @ n) + pad) / t - depth
@@ -101,34 +103,38 @@ def fit(replay: Replay, aspect: float) -> Camera:
 
 
 def dress(replay: Replay, camera: Camera, pixels: int = 1024) -> None:
-    """Set what the file's model leaves to the picture: field of view, clipping, floor, shadows.
+    """Adapt the model to the picture: field of view, clipping planes, floor, shadows.
 
     Args:
         replay: The run; its model is changed.
-        camera: That it is seen by.
-        pixels: Of the picture's longer side.
+        camera: The camera.
+        pixels: Length of the picture's longer side.
     """
     model = replay.model
     size = camera.distance * np.tan(np.radians(camera.field))
     model.vis.global_.fovy = camera.field
     model.stat.center[:] = camera.centre
+    # MuJoCo measures the clipping planes below in units of the extent.
     model.stat.extent = size
     model.vis.map.znear = 0.1
     model.vis.map.zfar = 60.0
     model.vis.quality.shadowsize = 2 * pixels
     floor = model.geom("floor")
-    floor.size[:2] = 0.0  # without end
+    # A plane of size 0 has no end.
+    floor.size[:2] = 0.0
     material = model.mat(int(floor.matid[0]))
+    # Repeats count per metre, not per geom: the floor has no size to divide.
     material.texuniform[:] = 1
     material.texrepeat[:] = 0.5 / _square(replay)
     material.reflectance[:] = 0.0
 
-    if not replay.ground.any():  # that of a leg in the air falls out of the picture's lower edge
+    # The shadow of a leg in the air would fall below the picture's lower edge.
+    if not replay.ground.any():
         model.light_castshadow[:] = 0
 
 
 def _square(replay: Replay) -> float:
-    """Return the side of the floor's squares [m]: 1, 2 or 5 of a decade, a quarter leg or less."""
+    """Return the side of the floor's squares [m]: 1, 2 or 5 times 10^n, at most a quarter leg."""
     wanted = 0.25 * replay.scenario.leg.size
     decade = 10.0 ** np.floor(np.log10(wanted))
     return float(decade * max(n for n in (1.0, 2.0, 5.0) if n * decade <= wanted))
@@ -138,16 +144,18 @@ def decorate(scene: mujoco.MjvScene, replay: Replay, row: int, eye: Array) -> No
     """Add the target path, the trail, target, ground force and belt of a row to a scene.
 
     Args:
-        scene: With room for them.
+        scene: The scene, with room for more geoms.
         replay: The run.
-        row: Of the record.
-        eye: From where they must be seen [m], (3,).
+        row: Row of the record.
+        eye: Position of the camera [m], (3,).
     """
     leg = replay.scenario.leg
     hip = np.array([0.0, replay.hip[row]])
     pen = Pen(scene, eye, 1.6 * leg.foot_radius + leg.radius)
     _pins(pen, replay, row, hip)
-    path = pen.before(_path(replay) + hip)  # the trail is thinner at its end, thicker at the foot
+    # Bars of one depth overlap by width: the trail is thinner than the path at its end and thicker
+    # at the foot, so that both are seen.
+    path = pen.before(_path(replay) + hip)
 
     for start, end in pairwise(path):
         pen.bar(start, end, 0.15 * leg.foot_radius, GREEN)
@@ -172,7 +180,7 @@ def _path(replay: Replay) -> Array:
 
 
 def _trail(replay: Replay, row: int) -> Array:
-    """Return where the foot was until a row, from the oldest on [m], (n, 2)."""
+    """Return the foot's positions before a row, oldest first [m], (n, 2)."""
     seconds = min(TRAIL_SECONDS, 0.8 * (replay.scenario.path.period or np.inf))
     back = seconds / replay.scenario.sim.timestep * np.linspace(1.0, 0.0, TRAIL_PARTS + 1)
     return replay.foot[np.maximum(row - np.round(back).astype(int), 0)]
@@ -187,7 +195,7 @@ def _pins(pen: Pen, replay: Replay, row: int, hip: Array) -> None:
 
 
 def _force(pen: Pen, replay: Replay, row: int, hip: Array) -> None:
-    """Draw the ground's force on the foot; the largest of the run is as long as the leg."""
+    """Draw the ground's force on the foot; the run's largest is as long as the leg."""
     leg = replay.scenario.leg
     force = replay.ground[row]
     largest = float(np.hypot(*replay.ground.T).max())
@@ -198,12 +206,13 @@ def _force(pen: Pen, replay: Replay, row: int, hip: Array) -> None:
 
 
 def _belt(pen: Pen, replay: Replay, row: int) -> None:
-    """Draw marks on the belt that run with it, a whole number of them a period."""
+    """Draw marks that move with the belt, a whole number of them per period."""
     assert replay.belt is not None
     size = replay.scenario.leg.size
     period = replay.scenario.path.period
     speed = abs(float(replay.belt[-1])) / replay.duration
     gap = 0.3 * size
+    # Then the marks of a film that repeats do not jump.
     if period is not None and speed > 0.0:
         gap = speed * period / max(1, round(speed * period / gap))
     shift = float(np.mod(replay.belt[row], gap))

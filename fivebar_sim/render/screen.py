@@ -1,4 +1,4 @@
-"""Whether windows can open."""
+"""Check that a window can open."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ from fivebar_sim.errors import ConfigError
 
 
 def check(instead: str) -> None:
-    """Raise where no window can open.
+    """Raise if no window can open.
 
     Args:
-        instead: What works there, for the message.
+        instead: What works without a screen, for the message.
 
     Raises:
-        ConfigError: On Linux, with neither DISPLAY nor WAYLAND_DISPLAY.
+        ConfigError: The system is Linux, and neither DISPLAY nor WAYLAND_DISPLAY is set.
     """
     if sys.platform == "linux" and not any(
         os.environ.get(name) for name in ("DISPLAY", "WAYLAND_DISPLAY")

@@ -1,4 +1,4 @@
-"""MuJoCo's interactive viewer: a run in real time, or a leg to move by its sliders."""
+"""MuJoCo's interactive viewer: a run in real time, or a leg that its sliders move."""
 
 from __future__ import annotations
 
@@ -24,21 +24,21 @@ from fivebar_sim.render.replay import Replay
 from fivebar_sim.scenario import Scenario
 
 INSTEAD = "`fivebar render` draws a run without one"
-"""What works where no window can open."""
+"""Advice where no window can open."""
 
 SECONDS = 1.0 / 60.0
-"""From one state shown to the next [s]."""
+"""Time between two states shown [s]."""
 LATE = 0.1
-"""Most that is simulated between two states shown [s]."""
+"""Longest simulated time between two states shown [s]."""
 SLIDER = math.radians(60.0)
-"""How far the sliders turn the motors to either side of the rest pose [rad]."""
+"""Range of the sliders to either side of the rest pose [rad]."""
 
 
-def chosen(source: str) -> FiveBar | Scenario:
-    """Return the leg or scenario of a shipped name or a TOML file; only a scenario has a path.
+def load(source: str) -> FiveBar | Scenario:
+    """Return the leg or scenario with a shipped name or in a TOML file.
 
     Raises:
-        ConfigError: Neither; or the file says something illegal.
+        ConfigError: The name is unknown, or the file has an illegal value.
     """
     legs = resources.shipped("models/legs")
     scenarios = resources.shipped("scenarios")
@@ -53,15 +53,16 @@ def chosen(source: str) -> FiveBar | Scenario:
         raise ConfigError(f"{known}; or a path to a .toml")
 
     table = tables.read(file, "leg or scenario")
+    # Every scenario has a path, and no leg has one.
     return Scenario.load(source) if "path" in table else FiveBar.load(source)
 
 
 def moment(replay: Replay, elapsed: float) -> float:
-    """Return the moment of the run to show [s]: all of it once, then its cycle over and over.
+    """Return the time of the run to show [s]: the whole run once, then its cycle over and over.
 
     Args:
         replay: The run.
-        elapsed: Since the start, by the clock [s].
+        elapsed: Time on the clock since the start [s].
     """
     start, length = replay.cycle
     end = start + length
@@ -73,7 +74,7 @@ def play(replay: Replay, clock: Callable[[], float] = time.monotonic) -> None:
 
     Args:
         replay: The run.
-        clock: Tells the time [s].
+        clock: Returns the time [s].
 
     Raises:
         ConfigError: No window can be opened.
@@ -87,6 +88,7 @@ def play(replay: Replay, clock: Callable[[], float] = time.monotonic) -> None:
         start = clock()
         while window.is_running():
             row = replay.row(moment(replay, clock() - start))
+            # The viewer draws in a thread of its own, from the same model and data.
             with window.lock():
                 data.time = (row + 1) * replay.scenario.sim.timestep
                 data.qpos[:] = replay.qpos[row]
@@ -102,7 +104,7 @@ def hold(leg: FiveBar, clock: Callable[[], float] = time.monotonic) -> None:
 
     Args:
         leg: The leg.
-        clock: Tells the time [s].
+        clock: Returns the time [s].
 
     Raises:
         ConfigError: No window can be opened.
@@ -110,6 +112,7 @@ def hold(leg: FiveBar, clock: Callable[[], float] = time.monotonic) -> None:
     built = model.build(leg, servo=Servo())
     data = mujoco.MjData(built)
     mujoco.mj_resetDataKeyframe(built, data, built.key("home").id)
+    # The viewer takes the range of a slider from its actuator.
     built.actuator_ctrllimited[:] = True
     built.actuator_ctrlrange[:] = data.ctrl[:, None] + np.array([-SLIDER, SLIDER])
     middle = np.array([0.0, 0.0, (model.HIP_HEIGHT - 0.4) * leg.size])
@@ -119,7 +122,8 @@ def hold(leg: FiveBar, clock: Callable[[], float] = time.monotonic) -> None:
             scene.Camera(middle, 2.0 * leg.size, built.vis.global_.fovy).aim(window.cam)
         start = clock()
         while window.is_running():
-            due = min(clock() - start, data.time + LATE)  # a slow machine falls behind the clock
+            # A slow machine falls behind the clock instead of simulating ever longer.
+            due = min(clock() - start, data.time + LATE)
             with window.lock():
                 while data.time < due:
                     mujoco.mj_step(built, data)
@@ -129,15 +133,16 @@ def hold(leg: FiveBar, clock: Callable[[], float] = time.monotonic) -> None:
 
 @contextmanager
 def _window(built: mujoco.MjModel, data: mujoco.MjData, *, controls: bool) -> Iterator[Any]:
-    """Give an open viewer of a model, whose loop is the caller's; closed at the end.
+    """Open the viewer of a model and close it at the end; the caller runs the loop.
 
     Raises:
-        ConfigError: It cannot open a window.
+        ConfigError: No window can be opened.
     """
     screen.check(INSTEAD)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        if not glfw.init():  # MuJoCo would end the process
+        # Where this fails, MuJoCo's viewer would end the whole process.
+        if not glfw.init():
             raise ConfigError("the viewer cannot open a window: the screen does not answer")
 
     try:

@@ -1,4 +1,4 @@
-"""The leg as dm_control's Physics and Task; import it after `gl.settle()`."""
+"""A leg as dm_control's physics and task; import it after `gl.set_mujoco_gl()`."""
 
 from __future__ import annotations
 
