@@ -1,7 +1,7 @@
 """Kinematics of the planar five-bar: pure NumPy, any batch shape, SI units and radians.
 
 Points and angle pairs are (..., 2), Jacobians (..., 2, 2). Working mode and assembly mode are
-arguments, never remembered state.
+arguments: no function remembers a previous pose.
 """
 
 from fivebar_sim.kinematics.closure import (

@@ -1,4 +1,4 @@
-"""Positions from angles: the knees, the loop's closure at C, the foot, and the branch of a pose."""
+"""Positions from angles: knees, closure of the loop at C, foot, and the branch of a pose."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from fivebar_sim.kinematics.planar import angle_between, cross, dot, perp, turne
 
 ROUNDING = 16 * np.finfo(float).eps
 """Slack of a squared distance d^2 at the edge of reach, relative to d times the coordinates of the
-two points: their rounding, no more."""
+two points: just their rounding."""
 
 
 class Points(NamedTuple):
@@ -32,7 +32,7 @@ class Points(NamedTuple):
 
 
 class Branch(NamedTuple):
-    """On which branch poses are: signs -1, 0 or +1, each of shape (...); 0 is singular."""
+    """The branch of poses: signs -1, 0 or +1, each of shape (...); 0 is singular."""
 
     s_A: NDArray[np.int_]
     s_E: NDArray[np.int_]
@@ -52,7 +52,7 @@ def knees(leg: FiveBar, theta: Array) -> tuple[Array, Array]:
 
 
 def loop_joint(leg: FiveBar, B: Array, D: Array, assembly: int | None = None) -> Array:
-    """Return C, the crossing of the circles about B and D on the side that assembly names.
+    """Return C, the crossing of the circles about B and D on the side given by `assembly`.
 
     With d = |BD|, u the unit vector along BD, and n = u turned by +90 deg:
 
@@ -80,13 +80,16 @@ def loop_joint(leg: FiveBar, B: Array, D: Array, assembly: int | None = None) ->
     low = abs(leg.L2 - leg.L3)
     high = leg.L2 + leg.L3
     d2 = dot(BD, BD)
-    # A pose at the very edge of reach counts as closed, whichever way it was rounded.
-    rounding = ROUNDING * (leg.size + leg.L5)  # of the coordinates of B and D [m]
+    # A pose at the very edge of reach counts as closed, whichever way it was rounded. B and D are
+    # at most leg.size + L5 from the origin, so this bounds the rounding of their coordinates [m].
+    rounding = ROUNDING * (leg.size + leg.L5)
     slack = rounding * high
+    # B on D is open: any C at that distance would close the loop.
     closed = (d2 >= low**2 - slack) & (d2 <= high**2 + slack) & (d2 > rounding**2)
     if not closed.all():
         raise _loop_open(np.sqrt(d2), ~closed, low, high)
 
+    # Factored, like the root below: a difference of two squares would lose digits.
     along = (d2 + (leg.L2 - leg.L3) * high) / (2.0 * d2)
     # Within the slack the product may be just below 0: there h is 0.
     across = np.sqrt(np.maximum((high**2 - d2) * (d2 - low**2), 0.0)) / (2.0 * d2)
@@ -112,16 +115,17 @@ def closed_points(leg: FiveBar, theta: ArrayLike, assembly: int | None = None) -
         assembly: +1 or -1; None is the leg's own.
 
     Raises:
-        LoopOpenError: Where the links do not meet.
+        LoopOpenError: The links do not meet in some pose.
     """
     B, D = knees(leg, as_pairs(theta, "theta"))
     C = loop_joint(leg, B, D, assembly)
+    # The extension is rigid with L2, so CF is BC turned and scaled.
     F = C + (leg.L6 / leg.L2) * turned(C - B, leg.bend)
     return Points(B, C, C, D, F)
 
 
 def forward(leg: FiveBar, theta: ArrayLike, assembly: int | None = None) -> Array:
-    """Return the foot F of motor angles; C where L6 = 0.
+    """Return the foot F at given motor angles; F is C if L6 = 0.
 
         F = C + (L6 / L2) R(bend) (C - B),   C from `loop_joint`
 
@@ -151,7 +155,7 @@ def passive(leg: FiveBar, theta: ArrayLike, assembly: int | None = None) -> Arra
         assembly: +1 or -1; None is the leg's own.
 
     Raises:
-        LoopOpenError: Where the links do not meet.
+        LoopOpenError: The links do not meet in some pose.
     """
     A, E = bases(leg)
     p = closed_points(leg, theta, assembly)
@@ -179,11 +183,11 @@ def chain_points(leg: FiveBar | LegArrays, q: Array) -> Points:
 
 
 def branch(leg: FiveBar | LegArrays, points: Points) -> Branch:
-    """Return the working mode and the assembly mode of poses, from where their joints are.
+    """Return the working mode and the assembly mode of poses, given their joints.
 
         s_A = sign(AF x AB),  s_E = sign(EC x ED),  assembly = sign(BD x BC)
 
-    A loop that is not quite closed is judged by C_right on E's side, by C_left elsewhere.
+    If the loop has a small gap, C_right is used on E's side and C_left elsewhere.
     """
     A, E = bases(leg)
     # AF, not AC: with an extension side A is solved to the foot.

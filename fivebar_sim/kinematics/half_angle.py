@@ -28,17 +28,18 @@ Where the published form breaks, and what is done here:
 - A sum of negative numerator and denominator would put atan2 / 2 beyond a quarter turn: the
   quotient's sign is given to the numerator, as atan does.
 - Out of reach the root is of a negative number; published code then yields NaN, or 0. Here the
-  reach is compared as `kinematics.inverse` does, and refused; at the edges rounding is cut at 0.
+  reach is checked as in `kinematics.inverse`, which raises; at the edges rounding is cut at 0.
 - C on A, with equal links: a = b = c = 0, any angle fits; theta is 0, as in `kinematics.inverse`.
 - L1^2 - L2^2 is computed as (L1 - L2) (L1 + L2), exactly 0 for equal links: the rounding of the
   squares would be all of c where C is near A.
 
-The form has no L6 and no tilt. Where L6 > 0 side A is solved to F with |BF| for L2, which fixes C;
-then side E to C. A tilted leg is turned back into the drawing first, and the angles turned forth.
+The published form has no L6 and no tilt. If L6 > 0, side A is solved to F with |BF| in place of L2,
+which fixes C; then side E to C. A tilted leg is rotated into the drawing's frame first, and its
+angles are rotated back.
 
 Let u = (L1 + L2 + L5)^2 eps, the rounding of c. As cos(alpha - atan2(b, a)) is c / 2 L1 |AC| and
-the sine of that angle s_A r / 2 L1 |AC|, alpha is known to some u / r; at full stretch and on the
-fold, where r = 0, to some sqrt(u / L1 |AC|). So is that of `kinematics.inverse`.
+the sine of that angle s_A r / 2 L1 |AC|, the error of alpha is about u / r; at full stretch and on
+the fold, where r = 0, about sqrt(u / L1 |AC|). The same holds for `kinematics.inverse`.
 """
 
 from __future__ import annotations
@@ -63,11 +64,11 @@ Range = tuple[float, float]
 
 PUBLISHED_LIMITS: tuple[Range, Range] = ((np.pi / 4.0, np.pi), (0.0, np.pi / 4.0))
 """Joint limits [rad] by which the published controller picks its branch, for a leg that stands
-upright (foot at z > 0): theta_A at least 45 deg, theta_E in 0..45 deg. It has no upper limit for
-theta_A; pi is that of 2 atan."""
+upright (foot at z > 0): theta_A at least 45 deg, theta_E in 0..45 deg. It gives no upper limit for
+theta_A; pi is the largest value of 2 atan."""
 
 SLACK = 1e-12
-"""Of joint limits [rad]: the rounding of an angle that is meant to be on one."""
+"""Slack of joint limits [rad]: the rounding of an angle that is meant to lie on one."""
 
 
 def half_angle(r: Array, near: float, far: float, s: int) -> tuple[Array, Bools]:
@@ -87,14 +88,17 @@ def half_angle(r: Array, near: float, far: float, s: int) -> tuple[Array, Bools]
     b = 2.0 * near * r[..., 1]
     c = d2 + (near - far) * (near + far)
     root = s * np.sqrt(np.maximum(a * a + b * b - c * c, 0.0))
+    # Of the two equal quotients, take the one whose terms keep their digits (see above).
     first = a * c + b * root >= 0.0
     over, under = np.where(first, [b + root, a + c], [c - a, b - root])
+    # The sign of the quotient goes to the numerator, so that atan2 / 2 stays within a quarter turn.
     alpha = 2.0 * np.arctan2(np.where(under < 0.0, -over, over), np.abs(under))
     return alpha, reaches(d2, near, far)
 
 
 def principal(angle: Array) -> Array:
-    """Return angles brought to (-pi, pi] by whole turns [rad]; those that are there stay as is."""
+    """Return angles brought to (-pi, pi] by whole turns [rad]."""
+    # Angles that are inside already keep their last bit; wrapping would round them.
     inside = (angle > -np.pi) & (angle <= np.pi)
     turned_back = wrap(angle)
     return np.where(inside, angle, np.where(turned_back <= -np.pi, np.pi, turned_back))
@@ -103,8 +107,10 @@ def principal(angle: Array) -> Array:
 def _solve(leg: FiveBar, foot: Array, mode: Mode) -> tuple[Array, Bools]:
     """Return (theta_A, theta_E) of points, and where each side reaches, both (..., 2)."""
     rho, phi = foot_radius_and_angle(leg)
-    with np.errstate(over="ignore", invalid="ignore"):  # infinitely far is out of reach
-        AF = turned(foot - bases(leg)[0], -leg.tilt)  # in the drawing's frame from here on
+    # Squares of far points may overflow to inf, which is out of reach like any other.
+    with np.errstate(over="ignore", invalid="ignore"):
+        # From here on vectors are in the drawing's frame.
+        AF = turned(foot - bases(leg)[0], -leg.tilt)
         alpha, ok_A = half_angle(AF, leg.L1, rho, mode[0])
         AC = AF
         if leg.L6 > 0.0:
@@ -112,6 +118,7 @@ def _solve(leg: FiveBar, foot: Array, mode: Mode) -> tuple[Array, Bools]:
             AC = AB + (leg.L2 / rho) * turned(AF - AB, -phi)
         EC = AC - np.array([leg.L5, 0.0])
         beta, ok_E = half_angle(EC, leg.L4, leg.L3, mode[1])
+        # A chain that ends on its motor fits at any angle; 0 by convention.
         on_motor = np.stack([dot(AF, AF), dot(EC, EC)], axis=-1) == 0.0
         theta = principal(np.stack([alpha, beta], axis=-1) + leg.tilt)
 
@@ -121,7 +128,7 @@ def _solve(leg: FiveBar, foot: Array, mode: Mode) -> tuple[Array, Bools]:
 def inverse_half_angle(leg: FiveBar, foot: ArrayLike, mode: Mode | None = None) -> Array:
     """Return the motor angles that put the foot F at given points, by the half-angle form.
 
-    The contract of `kinematics.inverse`, by another route: see the top of this file.
+    Arguments and results are those of `kinematics.inverse`; the top of this file has the method.
 
     Args:
         leg: The leg.
@@ -132,8 +139,8 @@ def inverse_half_angle(leg: FiveBar, foot: ArrayLike, mode: Mode | None = None) 
         (theta_A, theta_E) [rad] in (-pi, pi], (..., 2).
 
     Raises:
-        UnreachableError: Where a side chain does not reach, as `kinematics.inverse`; `.index` is
-            the first such point.
+        UnreachableError: A side chain does not reach some point, as in `kinematics.inverse`;
+            `.index` is the first such point.
         ArgumentError: Unknown mode, or a shape other than (..., 2).
     """
     mode = working_mode(leg, mode)
@@ -145,24 +152,24 @@ def inverse_half_angle(leg: FiveBar, foot: ArrayLike, mode: Mode | None = None) 
 
 
 def inverse_within(leg: FiveBar, foot: ArrayLike, limits: ArrayLike) -> Array:
-    """Return the motor angles, in the working mode whose angles are within joint limits.
+    """Return the motor angles in the working mode whose angles are within joint limits.
 
-    An angle is within its limits if a whole number of turns brings it there, but for `SLACK`; the
-    fewest turns are taken. Of several modes within, the first in the order of `MODES` is taken.
+    An angle counts as within its limits if whole turns bring it there, up to `SLACK`; the fewest
+    turns are taken. If several modes fit, the first in the order of `MODES` is taken.
 
     Args:
         leg: The leg.
         foot: F [m], hip frame, (..., 2).
-        limits: ((low_A, high_A), (low_E, high_E)) [rad], both ends legal; those of the published
-            controller are `PUBLISHED_LIMITS`.
+        limits: ((low_A, high_A), (low_E, high_E)) [rad], ends included; `PUBLISHED_LIMITS` are
+            those of the published controller.
 
     Returns:
         (theta_A, theta_E) [rad] within the limits, so perhaps beyond (-pi, pi], (..., 2).
 
     Raises:
-        UnreachableError: Where no mode reaches, or none that does is within the limits; the
-            message names the limit, `.index` is the first such point.
-        ArgumentError: Limits that are not two finite ranges, or a foot of other shape.
+        UnreachableError: No mode reaches some point, or none of those that do is within the
+            limits; the message names the limit, `.index` is the first such point.
+        ArgumentError: The limits are not two finite ranges, or foot has another shape.
     """
     foot = as_pairs(foot, "foot")
     low, high = _ends(limits)
@@ -172,10 +179,12 @@ def inverse_within(leg: FiveBar, foot: ArrayLike, limits: ArrayLike) -> Array:
     reached = ok[..., 0] & ok[..., 1]
     somewhere = reached.any(axis=-1, keepdims=True)
 
+    # Where no mode reaches, the leg's own tells why; points that some mode reaches are masked.
     if not somewhere.all():
         own = MODES.index(leg.mode)
         raise out_of_reach(leg, foot, theta[..., own, :], ok[..., own, :] | somewhere)
 
+    # theta + 2 pi n is within the limits for the whole numbers n between these two, if any.
     fewest = np.ceil((low - SLACK - theta) / (2.0 * np.pi))
     most = np.floor((high + SLACK - theta) / (2.0 * np.pi))
     fits = (fewest <= most) & reached[..., None]
@@ -203,9 +212,9 @@ def _ends(limits: ArrayLike) -> tuple[Array, Array]:
 def _beyond(
     foot: Array, theta: Array, fits: Bools, reached: Bools, ends: tuple[Array, Array]
 ) -> UnreachableError:
-    """Return the error for points of which not all have a mode within the limits.
+    """Return the error for points that have no mode within the limits.
 
-    It names the limits that none of the modes keeps; if each is kept in some mode, both.
+    It names the limit that no mode keeps; if each limit is kept by some mode, it names both.
     """
     bad = np.logical_not((fits[..., 0] & fits[..., 1]).any(axis=-1))
     index = first_index(bad)

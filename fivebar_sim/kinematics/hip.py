@@ -1,4 +1,4 @@
-r"""The leg in space: the planar mechanism turned out of its plane by a third angle, phi.
+r"""The leg in space: a third angle, phi, turns the planar mechanism about a hip axis.
 
 Body frame: origin on the hip's axis, x forward, y left, z up. At phi = 0 the leg plane is parallel
 to x-z, and the origin O of the leg's own frame (midway between A and E) lies at
@@ -39,7 +39,7 @@ class SideStep:
         leg: The planar leg.
         across: y of O at phi = 0 [m]: the offset of abduction, positive on a left leg.
         along: z of O at phi = 0 [m].
-        side: The hip solution that `inverse` takes: -1 foot below the axis, +1 above it.
+        side: Hip solution that `inverse` returns: -1 foot below the axis, +1 above it.
     """
 
     leg: FiveBar
@@ -64,7 +64,7 @@ class Steering:
         leg: The planar leg.
         across: y of O at phi = 0 [m], off the leg plane.
         along: x of O at phi = 0 [m], in the leg plane.
-        side: The hip solution that `inverse` takes: +1 foot before the axis, -1 behind it.
+        side: Hip solution that `inverse` returns: +1 foot in front of the axis, -1 behind it.
     """
 
     leg: FiveBar
@@ -108,7 +108,7 @@ def forward(hip: Hip, theta3: ArrayLike, assembly: int | None = None) -> Array:
         F [m], body frame, (..., 3).
 
     Raises:
-        LoopOpenError: Where the links do not meet; `.index` is the first such pose.
+        LoopOpenError: The links do not meet; `.index` is the first such pose.
         ArgumentError: A shape other than (..., 3), or angles that are not finite.
     """
     phi, theta = _split(theta3)
@@ -117,15 +117,16 @@ def forward(hip: Hip, theta3: ArrayLike, assembly: int | None = None) -> Array:
 
 
 def leg_plane(hip: Hip, foot: ArrayLike, side: ArrayLike | None = None) -> InPlane:
-    """Return the hip angle and the planar foot of given points: the leg is turned back.
+    """Return the hip angle and the foot in the leg plane for given points.
 
         SideStep:  u = side sqrt(y^2 + z^2 - across^2),   F = (x, u - along)
                    phi = atan2(z, y) - atan2(u, across)
         Steering:  u = side sqrt(x^2 + y^2 - across^2),   F = (u - along, z)
                    phi = atan2(y, x) - atan2(across, u)
 
-    where each difference is taken in one atan2. On the axis (only if across = 0) any phi fits; it
-    is 0 by convention. As u goes to 0, phi is known to eps across / u only; the foot stays exact.
+    where each difference is computed by a single atan2. On the axis (only if across = 0) any phi
+    fits; it is 0 by convention. As u goes to 0, the error of phi grows as eps across / u; the foot
+    stays exact.
 
     Args:
         hip: The leg and its hip.
@@ -133,13 +134,13 @@ def leg_plane(hip: Hip, foot: ArrayLike, side: ArrayLike | None = None) -> InPla
         side: Sign of u, +1 or -1, (...); None is the hip's own.
 
     Raises:
-        UnreachableError: Unless the foot is finite, and at least |across| from the axis.
+        UnreachableError: The foot is not finite, or nearer to the axis than |across|.
         ArgumentError: A shape other than (..., 3), or an unknown side.
 
     See:
-        Sen, Bakircioglu, Kalyoncu 2017 (IJSTR 6, 9): the side-step in other axes. Where the third
-        angle is published as tan(z / y) it must read atan2(z, y), which is phi - pi/2 with the
-        foot below and no offset: a ratio does not know its quadrant.
+        Sen, Bakircioglu, Kalyoncu 2017 (IJSTR 6, 9): the side-step in other axes. The third angle,
+        published as tan(z / y), must read atan2(z, y), which is phi - pi/2 with the foot below and
+        no offset: a ratio loses the quadrant.
     """
     foot = as_vectors(foot, "foot", 3)
     phi, planar, ok = _turned_back(hip, foot, side)
@@ -163,8 +164,8 @@ def inverse(
         (phi, theta_A, theta_E) [rad], each in (-pi, pi], (..., 3).
 
     Raises:
-        UnreachableError: Where the foot is nearer to the axis than |across|, or out of the leg's
-            reach; `.index` is the first such point.
+        UnreachableError: The foot is nearer to the axis than |across|, or out of the leg's reach;
+            `.index` is the first such point.
         ArgumentError: Unknown mode or side, or a shape other than (..., 3).
     """
     foot = as_vectors(foot, "foot", 3)
@@ -172,6 +173,7 @@ def inverse(
     try:
         theta = kinematics.inverse(hip.leg, planar, mode)
     except UnreachableError as error:
+        # Points within the hip's cylinder went in as NaN, which the planar leg does not reach.
         if not ok[error.index]:
             raise _within_cylinder(hip, foot, ok) from None
         raise UnreachableError(f"in the leg plane {error}", error.index) from None
@@ -186,7 +188,7 @@ def jacobian(hip: Hip, theta3: ArrayLike, assembly: int | None = None) -> Array:
         SideStep:  d F / d phi = (0, -z, y),   det J = u det J_leg
         Steering:  d F / d phi = (-y, x, 0),   det J = -u det J_leg
 
-    so the hip adds the singularity u = 0: phi cannot move the foot out of the leg plane.
+    so the hip adds the singularity u = 0, where phi cannot move the foot out of the leg plane.
 
     Args:
         hip: The leg and its hip.
@@ -197,8 +199,8 @@ def jacobian(hip: Hip, theta3: ArrayLike, assembly: int | None = None) -> Array:
         J [m/rad], body frame, (..., 3, 3): J[..., i, j] = d F_i / d theta3_j.
 
     Raises:
-        LoopOpenError: Where the links do not meet.
-        SingularError: Where B, C and D are in line: the foot's velocity is infinite.
+        LoopOpenError: The links do not meet.
+        SingularError: B, C and D are in line, so the foot's velocity is infinite.
         ArgumentError: A shape other than (..., 3), or angles that are not finite.
     """
     phi, theta = _split(theta3)
@@ -222,13 +224,16 @@ def _turned_back(hip: Hip, foot: Array, side: ArrayLike | None) -> tuple[Array, 
     p = F[..., 0]
     q = F[..., 1]
 
-    with np.errstate(over="ignore", invalid="ignore"):  # 1e200 m is as far as inf
+    # Far points may overflow to inf, which is as far out of reach.
+    with np.errstate(over="ignore", invalid="ignore"):
         r = np.hypot(p, q)
+        # Factored: a difference of two squares would lose digits.
         u2 = (r - abs(w)) * (r + abs(w))
         ok = np.asarray((u2 >= -ROUNDING * w * w) & np.isfinite(foot).all(axis=-1))
         u = sign * np.sqrt(np.where(ok, np.maximum(u2, 0.0), np.nan))
         phi = direction(q * u - p * w, p * u + q * w)
 
+    # Turned back by phi, the foot is at (u, w, .) from the axis; the leg's frame begins at O.
     back = _axis_up(hip, np.stack([u, np.full(u.shape, w), F[..., 2]], axis=-1)) - hip.origin
     return phi, back[..., ::2], ok
 

@@ -1,4 +1,4 @@
-"""The rest pose of a leg: as far from every singularity as it can be."""
+"""The rest pose of a leg, as far from every singularity as possible."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ from fivebar_sim.kinematics.planar import angle_between, cross, dot
 from fivebar_sim.kinematics.reach import points_at, solve
 
 GRID = 121
-"""Foot positions tried along x and along z."""
+"""Number of foot positions tried along x and along z."""
 
 
 def home(leg: FiveBar) -> Array:
     """Return the rest pose: the foot straight below or above O, far from every singularity.
 
-    Of the foot positions on x = 0, the one whose least sine among the angles at B (between AB and
-    BF), D and C is greatest; the lowest where several are equal. If the leg has none there, the
-    same over the whole plane.
+    Of the foot positions on x = 0 it takes the one that maximises the least sine of the angles at B
+    (between AB and BF), D and C; of equal ones the lowest. If no foot position on x = 0 is on the
+    leg's branch, it searches the whole plane.
 
     Args:
         leg: The leg.
@@ -31,7 +31,7 @@ def home(leg: FiveBar) -> Array:
         (theta_A, theta_B, theta_E, theta_D) [rad], each in (-pi, pi], (4,).
 
     Raises:
-        GeometryError: If no pose has the leg's working mode and assembly mode at once.
+        GeometryError: No pose has both the leg's working mode and its assembly mode.
     """
     # A copy, since callers may write into it.
     return _home(leg).copy()
@@ -64,12 +64,14 @@ def _best(leg: FiveBar, foot: Array) -> Array | None:
     BF = p.F - p.B
     ED = p.D - E
     DC = p.C_right - p.D
+    # A pose is as far from singular as its worst angle; the other assembly mode is not an option.
     sines = np.abs([_sine(AB, BF), _sine(ED, DC), _sine(BC, DC)]).min(axis=0)
     sines[branch(leg, p).assembly != leg.assembly] = 0.0
     if not sines.size or not sines.max() > 0.0:
         return None
 
-    best = int(np.argmax(sines.round(9)))  # rounded: equal ones differ by rounding only
+    # Rounded, since equally good positions differ by rounding errors, which must not choose.
+    best = int(np.argmax(sines.round(9)))
     theta_A, theta_E = theta[found][best]
     theta_B = angle_between(AB[best], BC[best])
     theta_D = angle_between(ED[best], DC[best])

@@ -1,4 +1,4 @@
-"""Several legs as one whose lengths are arrays, for formulas that place the joints."""
+"""Several legs as one object whose lengths are arrays, for formulas that place the joints."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from fivebar_sim.errors import ArgumentError
 from fivebar_sim.geometry import FiveBar, Mode
 
 LENGTHS = ("L1", "L2", "L3", "L4", "L5", "L6", "size")
-"""What each leg has of its own."""
+"""Attributes that each leg has of its own."""
 
 SHARED = ("bend", "tilt", "mode", "assembly", "foot_radius")
-"""What all the legs have in common."""
+"""Attributes that all legs have in common."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,7 +23,7 @@ class LegArrays:
     """n legs that differ in their lengths; attributes are those of `FiveBar`.
 
     Attributes:
-        L1, L2, L3, L4, L5, L6, size: One of each leg [m], (n, 1).
+        L1, L2, L3, L4, L5, L6, size: One value for each leg [m], (n, 1).
         bend, tilt, mode, assembly, foot_radius: The same for all legs.
     """
 
@@ -42,16 +42,17 @@ class LegArrays:
 
     @classmethod
     def of(cls, legs: Sequence[FiveBar]) -> LegArrays:
-        """Return the arrays of some legs.
+        """Return the arrays of several legs.
 
         Raises:
-            ArgumentError: Legs that differ in more than lengths and masses.
+            ArgumentError: The legs differ in more than lengths and masses.
         """
         first = legs[0]
         for name in SHARED:
             if any(getattr(leg, name) != getattr(first, name) for leg in legs):
                 raise ArgumentError(f"legs of one group must have the same {name}")
 
+        # Columns (n, 1) broadcast against points (n, 2).
         columns = {name: np.array([[getattr(leg, name)] for leg in legs]) for name in LENGTHS}
         shared = {name: getattr(first, name) for name in SHARED}
         return cls(**columns, **shared)

@@ -29,8 +29,8 @@ def end_velocity(AB: Array, BF: Array, psi_1_dot: Array, psi_2_dot: Array) -> Ar
     """Return F_dot = perp(AB) psi_1_dot + perp(BF) psi_2_dot of two links, A fixed, (..., 2).
 
     Args:
-        AB: Along the first link, (..., 2).
-        BF: From its end to F, along with the second link, (..., 2).
+        AB: First link, (..., 2).
+        BF: From the first link's end to F, fixed to the second link, (..., 2).
         psi_1_dot: Rate of the first link's direction [rad/s], (...).
         psi_2_dot: Rate of the second link's direction [rad/s], (...).
     """
@@ -54,8 +54,10 @@ def angle_between(a: Array, b: Array) -> Array:
 
 def direction(z: Array, x: Array) -> Array:
     """Return the direction of (x, z) in (-pi, pi] [rad], 0 where both are zero of either sign."""
-    angle = np.arctan2(z + 0.0, x + 0.0)  # -0.0 + 0.0 is 0.0
-    return np.where(angle == -np.pi, np.pi, angle)  # what a tiny negative z is rounded to
+    # Adding 0.0 turns -0.0 into 0.0: the sign of a zero must not decide the direction.
+    angle = np.arctan2(z + 0.0, x + 0.0)
+    # A tiny negative z is rounded to -pi, which is outside the range.
+    return np.where(angle == -np.pi, np.pi, angle)
 
 
 def wrap(angle: Array) -> Array:

@@ -15,8 +15,8 @@ from fivebar_sim.kinematics.planar import angle_between, cross, dot, perp, turne
 from fivebar_sim.kinematics.reach import foot_radius_and_angle, inverse
 
 SINGULAR = float(16 * np.sqrt(np.finfo(float).eps))
-"""Sine of the angle between two links below which rounding of the pose decides the answer: where
-links are in line, the computed sine is itself the root of several roundings."""
+"""Sine of the angle between two links below which rounding decides the answer: when links are in
+line, the computed sine is the square root of several rounding errors."""
 
 
 class JointMotion(NamedTuple):
@@ -51,8 +51,8 @@ def jacobian(leg: FiveBar, theta: ArrayLike, assembly: int | None = None) -> Arr
         J [m/rad], (..., 2, 2): J[..., i, j] = d F_i / d theta_j.
 
     Raises:
-        LoopOpenError: Where the links do not meet.
-        SingularError: Where B, C and D are in line (BC x DC = 0): the foot's velocity is infinite.
+        LoopOpenError: The links do not meet.
+        SingularError: B, C and D are in line (BC x DC = 0), so the foot's velocity is infinite.
     """
     A, E = bases(leg)
     p = closed_points(leg, theta, assembly)
@@ -85,7 +85,7 @@ def joint_motion(
 ) -> JointMotion:
     """Return the angles of all four joints along a foot path, with both time derivatives.
 
-    Side A is the two-link chain A, B, F; side E is E, D, C (see `_side_motion`). Where L6 > 0 the
+    Side A is the two-link chain A, B, F; side E is E, D, C (see `_side_motion`). If L6 > 0, the
     motion of C follows from side A: C = B + R(-phi) BF L2 / |BF|.
 
     Args:
@@ -99,9 +99,9 @@ def joint_motion(
         The joint motion; angles as `inverse` and `passive` give them.
 
     Raises:
-        UnreachableError: Where the foot is out of reach.
-        SingularError: Where a side chain is straight or folded.
-        ArgumentError: Shapes that do not broadcast, or rates that are not finite.
+        UnreachableError: The foot is out of reach.
+        SingularError: A side chain is straight or folded.
+        ArgumentError: The shapes do not broadcast, or rates are not finite.
     """
     F, F_dot, F_ddot = together(
         foot=as_pairs(foot, "foot"),
@@ -160,7 +160,7 @@ def _end_motion(r1: Array, r2: Array, rate: Pair, accel: Pair) -> tuple[Array, A
 
 
 def _refuse(sine: Array, where: str) -> None:
-    """Raise if the sine of the angle between two links is no more than rounding."""
+    """Raise if the sine of the angle between two links is within rounding of 0."""
     # Written so that NaN is singular too.
     singular = ~(np.abs(sine) > SINGULAR)
     if singular.any():

@@ -12,7 +12,7 @@ from fivebar_sim.kinematics.closure import ROUNDING, Points, bases, knees
 from fivebar_sim.kinematics.planar import direction, turned, unit, wrap
 
 BLOCK = 4096
-"""Points solved at a time, so that the temporaries stay in the cache (three times faster)."""
+"""Number of points solved at a time: temporaries stay in the cache, which is three times faster."""
 
 
 def side_angle(r: Array, near: float, far: float, s: int) -> tuple[Array, Bools]:
@@ -24,8 +24,8 @@ def side_angle(r: Array, near: float, far: float, s: int) -> tuple[Array, Bools]
         cos beta = N / (2 near d),  N = d^2 + near^2 - far^2
         sin beta = S / (2 near d),  S = sqrt(((near + far)^2 - d^2) (d^2 - (near - far)^2))
 
-    summed as directions, (x + i z) (N + i s S), so that one atan2 gives theta in (-pi, pi] and
-    nothing is lost at full stretch or on the fold. At d = 0 (only if near = far) any theta
+    added as directions, (x + i z) (N + i s S), so that a single atan2 gives theta in (-pi, pi] and
+    no digits are lost at full stretch or on the fold. At d = 0 (only if near = far) any theta
     fits; it is 0 by convention.
 
     Args:
@@ -35,25 +35,26 @@ def side_angle(r: Array, near: float, far: float, s: int) -> tuple[Array, Bools]
         s: +1 or -1, the side's working mode.
 
     Returns:
-        theta [rad], (...); and where |near - far| <= d <= near + far, (...).
+        theta [rad], (...); and whether |near - far| <= d <= near + far, (...).
     """
     return _side_angle(r[..., 0], r[..., 1], near, far, s)
 
 
 def _side_angle(x: Array, z: Array, near: float, far: float, s: int) -> tuple[Array, Bools]:
-    """Return what `side_angle` does, of separate coordinates."""
+    """Return what `side_angle` does, with x and z as separate arrays."""
     d2 = x * x + z * z
     low = (near - far) ** 2
     high = (near + far) ** 2
     # Factored: a difference of two squares would lose digits.
     N = d2 + (near - far) * (near + far)
+    # Negative out of reach, and by rounding at the very edge of it; `reaches` tells the two apart.
     S = s * np.sqrt(np.maximum((high - d2) * (d2 - low), 0.0))
     theta = direction(z * N + S * x, x * N - S * z)
     return theta, reaches(d2, near, far)
 
 
 def reaches(d2: Array, near: float, far: float) -> Bools:
-    """Return where a chain of two links spans a squared distance [m^2], but for its rounding."""
+    """Return whether a two-link chain spans a squared distance [m^2], with slack for rounding."""
     low = (near - far) ** 2
     high = (near + far) ** 2
     slack = ROUNDING * high
@@ -61,7 +62,7 @@ def reaches(d2: Array, near: float, far: float) -> Bools:
 
 
 def foot_radius_and_angle(leg: FiveBar) -> tuple[float, float]:
-    """Return |BF| [m] and the angle from BC to BF [rad]: (L2, 0) where L6 = 0."""
+    """Return |BF| [m] and the angle from BC to BF [rad]; (L2, 0) if L6 = 0."""
     along, across = leg.foot_offset
     return float(np.hypot(along, across)), float(np.arctan2(across, along))
 
@@ -69,13 +70,14 @@ def foot_radius_and_angle(leg: FiveBar) -> tuple[float, float]:
 def _solve(
     leg: FiveBar, foot: Array, mode: Mode
 ) -> tuple[tuple[Array, Array], tuple[Bools, Bools]]:
-    """Return (theta_A, theta_E) of points (n, 2), and where each side reaches: A to F, E to C."""
+    """Return (theta_A, theta_E) of points (n, 2), and whether each side reaches: A to F, E to C."""
     A, E = bases(leg)
     rho, phi = foot_radius_and_angle(leg)
     x = foot[:, 0]
     z = foot[:, 1]
     theta_A, ok_A = _side_angle(x - A[0], z - A[1], leg.L1, rho, mode[0])
 
+    # With an extension side E ends at C, which is known only once side A has placed L2.
     if leg.L6 > 0.0:
         B = A + leg.L1 * unit(theta_A)
         C = B + (leg.L2 / rho) * turned(foot - B, -phi)
@@ -87,14 +89,15 @@ def _solve(
 
 
 def solve(leg: FiveBar, foot: Array, mode: Mode) -> tuple[Array, Bools]:
-    """Return (theta_A, theta_E) of points, and where each side reaches: A to F, E to C.
+    """Return (theta_A, theta_E) of points, and whether each side reaches: A to F, E to C.
 
-    Both (..., 2); angles of a side that does not reach mean nothing.
+    Both have shape (..., 2); the angle of a side that does not reach has no meaning.
     """
     flat = foot.reshape(-1, 2)
     theta = np.empty(flat.shape)
     ok = np.empty(flat.shape, dtype=bool)
-    with np.errstate(over="ignore", invalid="ignore"):  # infinitely far is out of reach
+    # Squares of far points may overflow to inf, which is out of reach like any other.
+    with np.errstate(over="ignore", invalid="ignore"):
         for start in range(0, len(flat), BLOCK):
             block = slice(start, start + BLOCK)
             angles, reached = _solve(leg, flat[block], mode)
@@ -107,8 +110,8 @@ def solve(leg: FiveBar, foot: Array, mode: Mode) -> tuple[Array, Bools]:
 def inverse(leg: FiveBar, foot: ArrayLike, mode: Mode | None = None) -> Array:
     """Return the motor angles that put the foot F at given points.
 
-    Law of cosines on each side, theta = alpha + s beta (see `side_angle`). Where L6 > 0 side A is
-    solved to F with |BF| in place of L2, which fixes B, C and so side E: exact, in this order.
+    Law of cosines on each side, theta = alpha + s beta (see `side_angle`). If L6 > 0, side A is
+    solved to F with |BF| in place of L2, which fixes B and C, and then side E to C: exact.
 
     Args:
         leg: The leg.
@@ -120,7 +123,7 @@ def inverse(leg: FiveBar, foot: ArrayLike, mode: Mode | None = None) -> Array:
 
     Raises:
         UnreachableError: Unless | |AB| - |BF| | <= |AF| <= |AB| + |BF| and | |ED| - |DC| | <= |EC|
-            <= |ED| + |DC| for every point; `.index` is the first that is not.
+            <= |ED| + |DC| for every point; `.index` is the first bad point.
         ArgumentError: Unknown mode, or a shape other than (..., 2).
     """
     mode = working_mode(leg, mode)
@@ -132,7 +135,7 @@ def inverse(leg: FiveBar, foot: ArrayLike, mode: Mode | None = None) -> Array:
 
 
 def working_mode(leg: FiveBar, mode: Mode | None) -> Mode:
-    """Return a mode that was asked for, or the leg's own for None; ArgumentError if unknown."""
+    """Return the given mode, or the leg's own for None; ArgumentError if it is unknown."""
     mode = leg.mode if mode is None else mode
     if mode not in MODES:
         raise ArgumentError(f"mode must be one of {MODES}, got {mode!r}")
@@ -140,7 +143,7 @@ def working_mode(leg: FiveBar, mode: Mode | None) -> Mode:
 
 
 def out_of_reach(leg: FiveBar, foot: Array, theta: Array, ok: Bools) -> UnreachableError:
-    """Return the error for points and angles of which not all are ok, as `solve` gives them."""
+    """Return the error for points that `solve` found out of reach, given what it returned."""
     bad = np.logical_not(ok.all(axis=-1))
     index = first_index(bad)
     A, E = bases(leg)
@@ -170,9 +173,9 @@ def out_of_reach(leg: FiveBar, foot: Array, theta: Array, ok: Bools) -> Unreacha
 
 
 def points_at(leg: FiveBar, foot: Array, theta: Array) -> Points:
-    """Return the joints [m] of poses known to put F at `foot`, of whichever assembly mode that is.
+    """Return the joints [m] of poses known to put F at `foot`, in either assembly mode.
 
-    C = B + R(-phi) BF L2 / |BF|, with phi the angle from BC to BF; B = D is no exception.
+    C = B + R(-phi) BF L2 / |BF|, with phi the angle from BC to BF; this also holds if B = D.
     """
     B, D = knees(leg, theta)
     rho, phi = foot_radius_and_angle(leg)
@@ -181,7 +184,7 @@ def points_at(leg: FiveBar, foot: Array, theta: Array) -> Points:
 
 
 def inverse_all(leg: FiveBar, foot: ArrayLike) -> Array:
-    """Return the motor angles of all four working modes, NaN rows where a mode has none.
+    """Return the motor angles of all four working modes; NaN where a mode does not reach.
 
     Args:
         leg: The leg.
@@ -200,11 +203,11 @@ def inverse_all(leg: FiveBar, foot: ArrayLike) -> Array:
 
 
 def inverse_nearest(leg: FiveBar, foot: ArrayLike, theta_now: ArrayLike) -> Array:
-    """Return, of the four solutions, the one nearest to the present angles.
+    """Return the one of the four solutions that is nearest to the present angles.
 
-    Nearest is the least sum of squares of the two differences, each wrapped to half a turn; the
-    answer is continuous with theta_now (it may leave (-pi, pi], as joints do). Of equally near
-    solutions the first in the order of `MODES` is taken.
+    Nearest means the least sum of squares of the two differences, each wrapped to half a turn; the
+    result is continuous with theta_now, so it may leave (-pi, pi] as real joints do. Of equally
+    near solutions the first in the order of `MODES` is taken.
 
     Args:
         leg: The leg.
@@ -215,8 +218,8 @@ def inverse_nearest(leg: FiveBar, foot: ArrayLike, theta_now: ArrayLike) -> Arra
         (theta_A, theta_E) [rad], the broadcast shape (..., 2).
 
     Raises:
-        UnreachableError: Where no working mode reaches; `.index` is the first such point.
-        ArgumentError: Shapes that do not broadcast, or angles that are not finite.
+        UnreachableError: No working mode reaches some point; `.index` is the first such point.
+        ArgumentError: The shapes do not broadcast, or angles are not finite.
     """
     foot = as_pairs(foot, "foot")
     now = as_pairs(theta_now, "theta_now")
@@ -235,10 +238,10 @@ def inverse_nearest(leg: FiveBar, foot: ArrayLike, theta_now: ArrayLike) -> Arra
     cost = np.sum(step**2, axis=-1)
     lost = np.isnan(cost).all(axis=-1)
     if lost.any():
-        # No mode reaches there, so the leg's own tells why as well as any.
+        # No mode reaches there, so the error of the leg's own is as good as any.
         theta, ok = solve(leg, foot, leg.mode)
         raise out_of_reach(leg, foot, theta, ok | ~lost[..., None])
 
-    # argmin takes NaN for the least.
+    # argmin treats NaN as the least.
     best = np.argmin(np.where(np.isnan(cost), np.inf, cost), axis=-1)
     return now + np.take_along_axis(step, best[..., None, None], axis=-2)[..., 0, :]

@@ -1,4 +1,4 @@
-"""How far and how fast the joints may turn."""
+"""Limits of the joints' angles and rates."""
 
 from __future__ import annotations
 
@@ -7,13 +7,13 @@ import numpy as np
 from fivebar_sim.arrays import Array
 
 C_STOP = float(np.radians(2.0))
-"""Where the angle at C is stopped, from 0 and from 180 deg [rad]."""
+"""Distance of the stops of the angle at C from 0 and from 180 deg [rad]."""
 
 MOTOR_RANGE = 2.0 * np.pi
-"""How far the motors turn to either side of theta = 0 [rad]."""
+"""Range of the motors to either side of theta = 0 [rad]."""
 
 SPEED_LIMIT = 1e4
-"""Joint rate beyond which a simulation has broken down [rad/s]: a hundred thousand rpm."""
+"""Joint rate beyond which a simulation counts as diverged [rad/s]: a hundred thousand rpm."""
 
 
 def angle_at_C(q: Array) -> Array:
@@ -30,5 +30,6 @@ def angle_at_C(q: Array) -> Array:
 
 def stops_at_C(rest: Array) -> tuple[float, float]:
     """Return the range of the angle at C in the assembly mode of a rest pose (4,) [rad]."""
+    # Between two multiples of pi there is one assembly mode; the rest pose tells which two.
     straight = float(np.floor(angle_at_C(rest) / np.pi) * np.pi)
     return straight + C_STOP, straight + np.pi - C_STOP

@@ -1,8 +1,8 @@
-r"""Two-link legs, to compare the five-bar's load sharing with: the serial leg, the crouching leg.
+r"""Two-link legs for comparison with the five-bar's load sharing: serial leg, crouching leg.
 
   A            A  hip, driven; origin, x forward, z up; theta_A anticlockwise from +x to +z
 L1 \           B  knee, driven; theta_B turns L1's direction into L2's
-    B          F  foot; angles, knee's sign and foot force read as on side A of the five-bar
+    B          F  foot; angles, sign of the knee and foot force are as on side A of the five-bar
 L2 /
   F
 """
@@ -31,8 +31,8 @@ class SerialLeg:
     Attributes:
         L1: Femur |AB| [m].
         L2: Tibia |BF| [m].
-        knee: Which elbow `inverse` takes, the sign of AF x AB: +1 has the knee of a hanging leg
-            forward (theta_B < 0), -1 backward (theta_B > 0).
+        knee: Solution that `inverse` returns, the sign of AF x AB: +1 puts the knee of a hanging
+            leg forward (theta_B < 0), -1 backward (theta_B > 0).
     """
 
     L1: float
@@ -72,15 +72,17 @@ class SerialLeg:
             (theta_A, theta_B) [rad], both in (-pi, pi], (..., 2).
 
         Raises:
-            UnreachableError: Unless |L1 - L2| <= |AF| <= L1 + L2; `.index` is the first such point.
+            UnreachableError: Unless |L1 - L2| <= |AF| <= L1 + L2; `.index` is the first bad point.
             ArgumentError: A shape other than (..., 2), or an unknown knee.
         """
         sign = self.knee if knee is None else knee
         if sign not in (-1, 1):
             raise ArgumentError(f"knee must be -1 or 1, got {sign!r}")
 
-        F = as_pairs(foot, "foot") + 0.0  # -0.0 would be a direction of its own
-        with np.errstate(over="ignore", invalid="ignore"):  # 1e200 m is as far as inf
+        # Adding 0.0 turns -0.0 into 0.0: the sign of a zero must not decide a direction.
+        F = as_pairs(foot, "foot") + 0.0
+        # Far points may overflow to inf, which is as far out of reach.
+        with np.errstate(over="ignore", invalid="ignore"):
             theta_A, ok = side_angle(F, self.L1, self.L2, sign)
 
         if not ok.all():
@@ -94,7 +96,7 @@ class SerialLeg:
     def jacobian(self, theta: ArrayLike) -> Array:
         """Return d F / d (theta_A, theta_B) = (perp(AF), perp(BF)), perp(x, z) = (-z, x).
 
-        Its determinant is L1 L2 sin(theta_B): the straight and the folded leg are singular.
+        Its determinant is L1 L2 sin(theta_B), so the straight and the folded leg are singular.
 
         Args:
             theta: (theta_A, theta_B) [rad], (..., 2).
@@ -109,7 +111,7 @@ class SerialLeg:
         return np.stack([perp(AB + BF), perp(BF)], axis=-1)
 
     def static_torques(self, theta: ArrayLike, force: ArrayLike, *, belt: bool = False) -> Array:
-        """Return the motor torques that hold a foot force at rest; the links weigh nothing.
+        """Return the motor torques that hold a foot force at rest, for links without weight.
 
         tau = -J^T F, the moments of the force about hip and knee:
 
@@ -117,15 +119,15 @@ class SerialLeg:
 
         tau_A acts between body and femur, tau_B between femur and tibia (motor in the knee). With
         `belt` the second motor sits on the body and turns the tibia through a belt or parallel
-        bar: its angle is theta_A + theta_B, its torque tau_B, and the hip has tau_A - tau_B.
+        bar: its angle is theta_A + theta_B and its torque tau_B; the hip's torque is tau_A - tau_B.
 
         Args:
             theta: (theta_A, theta_B) [rad], (..., 2).
             force: (x, z) that the world exerts on the foot [N], broadcasts with theta.
-            belt: Both motors on the body.
+            belt: Whether both motors are on the body.
 
         Returns:
-            (hip, knee) torques [N m], positive with the angle that they drive, (..., 2).
+            (hip, knee) torques [N m], positive in the direction of the driven angle, (..., 2).
 
         Raises:
             ArgumentError: Shapes that do not broadcast, or numbers that are not finite.
@@ -144,10 +146,10 @@ class SerialLeg:
 
 @dataclass(frozen=True, slots=True)
 class CrouchingLeg:
-    """The symmetric leg that only crouches: equal links, the hip straight above the foot.
+    """The symmetric leg that only crouches: equal links, and the hip straight above the foot.
 
-    The base floats: the foot stands still, the hip is at height h above it. q1 is the femur's
-    angle from straight down, positive with the knee forward, q2 the knee's:
+    The foot stands still and the hip moves at height h above it. q1 is the femur's angle from
+    straight down, positive with the knee forward, and q2 is the knee's angle:
 
         h = 2 l cos q1,   q2 = -2 q1,   -pi/2 <= q1 <= pi/2
 
@@ -181,17 +183,18 @@ class CrouchingLeg:
 
             q1 = knee arccos(h / 2 l),   q2 = -2 q1
 
-        computed as atan2(sqrt((2 l - h) (2 l + h)), h), which loses nothing near full stretch.
+        computed as atan2(sqrt((2 l - h) (2 l + h)), h), which keeps its digits near full stretch.
 
         Raises:
-            UnreachableError: Unless 0 <= h <= 2 l; `.index` is the first such height.
+            UnreachableError: Unless 0 <= h <= 2 l; `.index` is the first bad height.
         """
         high = 2.0 * self.l
         height = _numbers(h, "h")
         ok = (height >= -ROUNDING * high) & (height <= (1.0 + ROUNDING) * high)
         if not ok.all():
             raise _unreachable("h", height, ~ok, 0.0, high)
-        height = np.clip(height, 0.0, high)  # h was checked: only rounding is cut off
+        # The height was checked, so this cuts off rounding only.
+        height = np.clip(height, 0.0, high)
         q1 = self.knee * np.arctan2(np.sqrt((high - height) * (high + height)), height)
         return np.stack([q1, -2.0 * q1], axis=-1)
 
@@ -208,13 +211,13 @@ class CrouchingLeg:
 
         Args:
             q1: Hip angle [rad], (...).
-            h_dot: Velocity of the hip, up [m/s], broadcasts with q1.
+            h_dot: Upward velocity of the hip [m/s], broadcasts with q1.
 
         Returns:
             (q1_dot, q2_dot) [rad/s], q2_dot = -2 q1_dot, (..., 2).
 
         Raises:
-            SingularError: At full stretch, sin q1 = 0, where the rate is infinite or undetermined.
+            SingularError: At full stretch, sin q1 = 0, the rate is infinite or undetermined.
             ArgumentError: Unless -pi/2 <= q1 <= pi/2 and h_dot is finite; shapes that differ.
         """
         v = finite(_numbers(h_dot, "h_dot"), "h_dot")
@@ -229,21 +232,21 @@ class CrouchingLeg:
         return np.stack([q1_dot, -2.0 * q1_dot], axis=-1)
 
     def static_torques(self, q1: ArrayLike, load: ArrayLike, *, belt: bool = False) -> Array:
-        """Return the motor torques that carry a load on the hip; the links weigh nothing.
+        """Return the motor torques that carry a load on the hip, for links without weight.
 
         The ground pushes the foot up with the load, (0, load), straight through the hip:
 
             tau_1 = 0,   tau_2 = load l sin q1
 
-        With `belt` (see `SerialLeg.static_torques`) the hip's motor has to hold -tau_2 besides.
+        With `belt` (see `SerialLeg.static_torques`) the hip's motor has to hold -tau_2 as well.
 
         Args:
             q1: Hip angle [rad], (...).
             load: Weight on the hip [N], broadcasts with q1.
-            belt: Both motors on the body.
+            belt: Whether both motors are on the body.
 
         Returns:
-            (tau_1, tau_2) [N m], positive with the angle that they drive, (..., 2).
+            (tau_1, tau_2) [N m], positive in the direction of the driven angle, (..., 2).
 
         Raises:
             ArgumentError: Unless -pi/2 <= q1 <= pi/2 and the load is finite; shapes that differ.
@@ -256,6 +259,7 @@ class CrouchingLeg:
 
 def _hip_angle(q1: ArrayLike) -> Array:
     angle = _numbers(q1, "q1")
+    # Written so that NaN is beyond too.
     beyond = np.logical_not(np.abs(angle) <= 0.5 * np.pi)
     if beyond.any():
         got = float(angle[beyond].flat[0])
