@@ -4,10 +4,10 @@ Angle pairs are theta = (theta_A, theta_E), torques tau = (tau_A, tau_E), (..., 
 
     tau = M(theta) theta_ddot + bias(theta, theta_dot) - J^T F
 
-F is what the world does to the foot. Weight and motor armature are in; `inverse`, `forward` and
-`step_torques` add the Coulomb friction of the gears, and a torque law may have any other.
+F is the force of the world on the foot. Weight and motor armature are included. `inverse`,
+`forward` and `step_torques` can add Coulomb friction of the gears; a torque law may add any other.
 
-`LegDynamics(leg, assembly, payload)` has all functions as methods, for whoever asks more than once.
+`LegDynamics(leg, assembly, payload)` has all functions as methods, for repeated calls.
 """
 
 from fivebar_sim.dynamics.laws import (

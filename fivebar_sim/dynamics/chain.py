@@ -1,4 +1,4 @@
-"""The closed chain in the two motor angles: the knees and C eliminated in closed form.
+"""The closed chain in the two motor angles, with the knees and C eliminated in closed form.
 
 psi_k is the direction of link k from +x, e_k = (cos psi_k, sin psi_k): e1 along AB, e2 along BC,
 e3 along DC, e4 along ED. So psi_1 = theta_A, psi_4 = theta_E, and the loop
@@ -14,8 +14,8 @@ open tree's mass matrix H (links 1, 2 and links 4, 3), its centripetal torques c
 
     M = G^T H G,   bias = G^T (H g + c - Q),   psi_ddot = G theta_ddot + g
 
-Everything here works on separate coordinates (x, z), arrays of shape (...) or single floats: the
-integrator of one leg calls it a hundred thousand times.
+Everything here works on separate coordinates (x, z), arrays of shape (...) or single floats, for
+speed: the integrator of one leg calls it a hundred thousand times.
 """
 
 from __future__ import annotations
@@ -53,12 +53,12 @@ def dot(a: Vector, b: Vector) -> Scalar:
 
 
 def placed(e: Vector, r: Vector) -> Vector:
-    """Return a vector r = (along, across) of a link's frame in the hip frame, e the link's own."""
+    """Return a vector r = (along, across) of a link in the hip frame; e is the link's direction."""
     return r[0] * e[0] - r[1] * e[1], r[0] * e[1] + r[1] * e[0]
 
 
 class Pose(NamedTuple):
-    """A pose: directions (x, z) of L1..L4, and how those turn with the motors if it is closed.
+    """A pose: directions (x, z) of L1..L4, and how the motors turn L2 and L3 if the loop is closed.
 
     Attributes:
         e1: Along AB.
@@ -88,16 +88,16 @@ class Chain:
     Attributes:
         leg: The leg.
         assembly: +1 or -1.
-        I1: Inertia about A of L1, of L2's mass at B, and of A's rotor [kg m^2].
+        I1: Inertia about A of L1, L2's mass at B, and A's rotor [kg m^2].
         I2: Inertia of L2 about B [kg m^2].
         I3: Inertia of L3 about D [kg m^2].
-        I4: Inertia about E of L4, of L3's mass at D, and of E's rotor [kg m^2].
-        S1: Moment of L1 about A and of L2's mass at B [kg m].
-        S2: Moment of L2 about B [kg m].
-        S3: Moment of L3 about D [kg m].
-        S4: Moment of L4 about E and of L3's mass at D [kg m].
+        I4: Inertia about E of L4, L3's mass at D, and E's rotor [kg m^2].
+        S1: Moment of mass of L1 about A, and of L2's mass at B [kg m].
+        S2: Moment of mass of L2 about B [kg m].
+        S3: Moment of mass of L3 about D [kg m].
+        S4: Moment of mass of L4 about E, and of L3's mass at D [kg m].
         AE: From A to E [m].
-        hung: Moment of A's masses at A and of E's at E about O, in the hip frame [kg m].
+        hung: Moment of mass about O of side A's masses at A and side E's at E, hip frame [kg m].
     """
 
     leg: FiveBar
@@ -115,12 +115,12 @@ class Chain:
 
     @classmethod
     def of(cls, leg: FiveBar, assembly: int | None, payload: float) -> Chain:
-        """Return the constants of a leg that carries a point mass at the foot.
+        """Return the constants of a leg with a point mass at the foot.
 
         Args:
             leg: The leg.
             assembly: +1 or -1; None is the leg's own.
-            payload: At F [kg].
+            payload: Point mass at F [kg].
 
         Raises:
             ArgumentError: Unknown assembly, or a payload that is not finite or negative.
@@ -131,10 +131,10 @@ class Chain:
 
         check_number("payload", payload, "kg", low=0.0, high=HEAVIEST)
         one, two, three, four = leg.links
-        # The foot is part of L2, so what it carries is too.
+        # The foot is part of L2, and so is the payload.
         two = combined(two, Link(payload, leg.foot_offset, 0.0))
-        x, z = kinematics.bases(leg)[1].tolist()  # E = -A
-        # E = -A: the moments of the masses hung there differ in sign only.
+        x, z = kinematics.bases(leg)[1].tolist()
+        # E = -A, so that the moments of the masses hung there differ in sign only.
         right = three.mass + four.mass - one.mass - two.mass
 
         return cls(
@@ -159,8 +159,8 @@ class Chain:
         sqrt(((L2 + L3)^2 - d^2) (d^2 - (L2 - L3)^2)) / 2 L2 L3, checked before any division.
 
         Raises:
-            LoopOpenError: Where the links do not meet.
-            SingularError: Where B, C and D are in line.
+            LoopOpenError: The links do not meet.
+            SingularError: B, C and D are in line.
         """
         leg = self.leg
         L1 = leg.L1
@@ -171,19 +171,21 @@ class Chain:
         maths: Any = math if isinstance(theta_A, float) else np
         e1 = maths.cos(theta_A), maths.sin(theta_A)
         e4 = maths.cos(theta_E), maths.sin(theta_E)
-        x = self.AE[0] + L4 * e4[0] - L1 * e1[0]  # BD
+        # BD = (x, z).
+        x = self.AE[0] + L4 * e4[0] - L1 * e1[0]
         z = self.AE[1] + L4 * e4[1] - L1 * e1[1]
         d2 = x * x + z * z
-        area = ((L2 + L3) ** 2 - d2) * (d2 - (L2 - L3) ** 2)  # (4 times that of BCD) squared
+        # The square of four times the area of the triangle BCD (Heron), 0 where it is flat.
+        area = ((L2 + L3) ** 2 - d2) * (d2 - (L2 - L3) ** 2)
 
         regular = area > (2.0 * L2 * L3 * SINGULAR) ** 2
         if regular is not True and not np.all(regular):
-            # Only a bad pose gets here: `jacobian` raises what is wrong with it, and where.
+            # Only a bad pose gets here; `jacobian` raises the right error, with its index.
             kinematics.jacobian(leg, np.stack([theta_A, theta_E], axis=-1), self.assembly)
 
         along = (d2 + (L2 - L3) * (L2 + L3)) / (2.0 * d2)
         across = self.assembly * maths.sqrt(area) / (2.0 * d2)
-        # From BD to BC by similarity, so that L2 and L3 need no trigonometry.
+        # From BD to BC by rotating and scaling, so that L2 and L3 need no trigonometry.
         BC = along * x - across * z, along * z + across * x
         e2 = BC[0] / L2, BC[1] / L2
 
@@ -192,7 +194,7 @@ class Chain:
     def coupled(self, e1: Vector, e2: Vector, e3: Vector, e4: Vector) -> Pose:
         """Return the pose of the links' directions; e2 and e3 must not be in line.
 
-        G is the null space of the gap's Jacobian, so it is right also where the loop is open.
+        G spans the null space of the gap's Jacobian, so it also holds where the loop is open.
         """
         L1 = self.leg.L1
         L2 = self.leg.L2
@@ -206,7 +208,7 @@ class Chain:
         return Pose(e1, e2, e3, e4, a2, b2, a3, b3)
 
     def couplings(self, p: Pose) -> Vector:
-        """Return H12 = L1 e1 . r2 and H43 = L4 e4 . r3 [kg m^2], r_k the moments S_k placed."""
+        """Return H12 = L1 e1 . r2 and H43 = L4 e4 . r3 [kg m^2], r_k from `moments`."""
         H12 = self.leg.L1 * dot(p.e1, placed(p.e2, self.S2))
         return H12, self.leg.L4 * dot(p.e4, placed(p.e3, self.S3))
 
@@ -222,7 +224,7 @@ class Chain:
         )
 
     def link_torques(self, p: Pose, w: Four, alpha: Four) -> Four:
-        """Return H psi_ddot + c - Q of links 1..4 [N m] at any rates w and accelerations alpha.
+        """Return H psi_ddot + c - Q of links 1..4 [N m] for any rates w and accelerations alpha.
 
         H = I on the diagonal, with H12 and H43 off it
         c1 = -X12 w2^2,  c2 = X12 w1^2,   X12 = L1 e1 x r2    (4, 3 likewise)
@@ -243,7 +245,8 @@ class Chain:
         )
 
     def at_motors(self, p: Pose, t: Four) -> Vector:
-        """Return the motor torques G^T t [N m] of link torques: the force in C cancels."""
+        """Return the motor torques G^T t [N m] of link torques t."""
+        # G moves the chain with the loop closed, so the force in C does no work and drops out.
         return t[0] + p.a2 * t[1] + p.a3 * t[2], t[3] + p.b2 * t[1] + p.b3 * t[2]
 
     def bias(self, p: Pose, w1: Scalar, w4: Scalar) -> Vector:
@@ -255,6 +258,7 @@ class Chain:
         leg = self.leg
         w2 = p.a2 * w1 + p.b2 * w4
         w3 = p.a3 * w1 + p.b3 * w4
+        # With constant motor rates the loop still accelerates L2 and L3, by g2 and g3.
         k1 = leg.L1 * w1 * w1
         k2 = leg.L2 * w2 * w2
         k3 = leg.L3 * w3 * w3
@@ -270,17 +274,17 @@ class Chain:
         return self.at_motors(p, self.link_torques(p, (w1, w2, w3, w4), (0.0, g2, g3, 0.0)))
 
     def moments(self, p: Pose) -> tuple[Vector, Vector, Vector, Vector]:
-        """Return r1..r4, the moments S1..S4 in the hip frame [kg m]."""
+        """Return r1..r4, the moments of mass S1..S4 in the hip frame [kg m]."""
         r1 = placed(p.e1, self.S1)
         r2 = placed(p.e2, self.S2)
         return r1, r2, placed(p.e3, self.S3), placed(p.e4, self.S4)
 
     def foot_torques(self, p: Pose, force: Vector) -> Vector:
-        """Return J^T F [N m] of a foot force [N]: F moves with perp(AB) psi_1 + perp(BF) psi_2.
+        """Return J^T F [N m] of a foot force [N]; the foot moves with the turns of L1 and L2.
 
         (J^T F)_A = AB x F + a2 BF x F,   (J^T F)_E = b2 BF x F
         """
-        # Virtual work: the torque on L2 about B is spread as L2 turns with the motors.
+        # Virtual work: each motor takes the torque on L2 about B as much as it turns L2.
         about_B = cross(placed(p.e2, self.leg.foot_offset), force)
         return self.leg.L1 * cross(p.e1, force) + p.a2 * about_B, p.b2 * about_B
 
@@ -291,13 +295,13 @@ class Chain:
         f_A, f_E = (0.0, 0.0) if force is None else self.foot_torques(p, force)
         t_A = tau[0] - h_A + f_A
         t_E = tau[1] - h_E + f_E
-        # Two by two: Cramer's rule is exact enough (M is positive definite) and needs no LAPACK
-        # call a step.
+        # Cramer's rule: accurate enough for a positive definite 2 x 2 matrix, and it saves a LAPACK
+        # call in every step.
         det = M_AA * M_EE - M_AE * M_AE
         return (M_EE * t_A - M_AE * t_E) / det, (M_AA * t_E - M_AE * t_A) / det
 
     def energies(self, p: Pose, w: Four) -> Vector:
-        """Return the kinetic energy and the potential one, zero at O [J]; the loop may be open.
+        """Return the kinetic and the potential energy, zero at O [J]; the loop may be open.
 
         psi_dot^T H psi_dot / 2,   -gravity . (moments of mass about O)
         """

@@ -1,6 +1,6 @@
 """The closed chain's equation of motion at given poses, rates and torques.
 
-Each function is the method of that name of `LegDynamics`, for a single question.
+Each function calls the method of the same name of `LegDynamics`, for a single use.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ def inverse(
 
         tau = M theta_ddot + bias - J^T F + friction sign(theta_dot)
 
-    At rest without weight tau = -J^T F, with weight what holds the leg: sticking is not modelled.
+    At rest it is the torque that holds the leg (-J^T F without weight): sticking is not modelled.
 
     Args:
         leg: The leg.
@@ -57,7 +57,7 @@ def statics(
 ) -> Array:
     """Return the motor torques that hold a foot force at rest: tau = -J^T F.
 
-    The links weigh nothing here; with their weight it is `inverse` at zero rates.
+    The links have no weight here; with their weight use `inverse` at zero rates.
 
     Args:
         leg: The leg.
@@ -106,7 +106,7 @@ def bias(
     assembly: int | None = None,
     payload: float = 0.0,
 ) -> Array:
-    """Return the torques that a motion at constant motor rates takes: centripetal and weight.
+    """Return the torques needed at constant motor rates: centripetal terms and weight.
 
         bias = G^T (H g + c - Q)
 
@@ -118,7 +118,7 @@ def bias(
         payload: Point mass at F [kg].
 
     Returns:
-        (..., 2) [N m]; at theta_dot = 0 the slope of the potential energy.
+        (..., 2) [N m]; at theta_dot = 0 the gradient of the potential energy.
 
     Raises:
         LoopOpenError: Where the links do not meet.
@@ -139,7 +139,7 @@ def forward(
     payload: float = 0.0,
     friction: float = 0.0,
 ) -> Array:
-    """Return the motor accelerations under given torques; `inverse` turned round.
+    """Return the motor accelerations under given torques, the inverse of `inverse`.
 
         theta_ddot = M^-1 (tau - friction sign(theta_dot) - bias + J^T F)
 
@@ -198,8 +198,8 @@ def reflected_inertia(
 ) -> Array:
     """Return the inertia that the world feels at the foot: J^-T M J^-1.
 
-    A force F on the foot of a leg at rest, motors free, no weight, moves it by F_ddot with
-    F = J^-T M J^-1 F_ddot.
+    A force on the foot of a leg at rest, with free motors and no weight, accelerates it by a with
+    force = J^-T M J^-1 a.
 
     Args:
         leg: The leg.

@@ -1,4 +1,4 @@
-"""A leg's dynamics as one object: the leg, its assembly mode and what it carries."""
+"""A leg's dynamics as one object: the leg, its assembly mode and its payload."""
 
 from __future__ import annotations
 
@@ -21,11 +21,12 @@ from fivebar_sim.kinematics.rates import SINGULAR
 
 
 class Energy(NamedTuple):
-    """The mechanical energy of poses in motion.
+    """The mechanical energy of moving poses.
 
     Attributes:
         kinetic: Kinetic energy of links, payload and rotors [J], (...).
-        potential: That of links and payload, 0 with all at O, the hip frame's origin [J], (...).
+        potential: Potential energy of links and payload, zero at O, the hip frame's origin [J],
+            (...).
     """
 
     kinetic: Array
@@ -36,7 +37,7 @@ class Energy(NamedTuple):
 class LegDynamics:
     """The dynamics of one leg with one payload, checked and prepared once.
 
-    Arguments, units and errors of each method are those of the function of that name in
+    Arguments, units and errors of each method are those of the function of the same name in
     `fivebar_sim.dynamics`, without leg, assembly and payload.
 
     Attributes:
@@ -66,7 +67,7 @@ class LegDynamics:
         *,
         friction: float = 0.0,
     ) -> Array:
-        """Return the motor torques (tau_A, tau_E) of a motion [N m], (..., 2)."""
+        """Return the motor torques (tau_A, tau_E) that a motion needs [N m], (..., 2)."""
         check_number("friction", friction, "N m", low=0.0)
         force = (0.0, 0.0) if foot_force is None else foot_force
         theta, w, alpha, F = _pairs(
@@ -82,7 +83,7 @@ class LegDynamics:
         return np.stack([tau_A, tau_E], axis=-1) + friction * np.sign(w)
 
     def statics(self, theta: ArrayLike, foot_force: ArrayLike) -> Array:
-        """Return the motor torques that hold a foot force at rest, without any weight [N m]."""
+        """Return the motor torques that hold a foot force at rest, without weight [N m]."""
         theta, F = _pairs(theta=theta, foot_force=foot_force)
         f_A, f_E = self._chain.foot_torques(self._chain.pose(*_split(theta)), _split(F))
         return np.stack([-f_A, -f_E], axis=-1)
@@ -94,7 +95,7 @@ class LegDynamics:
         return np.stack([np.stack([M_AA, M_AE], -1), np.stack([M_AE, M_EE], -1)], -2)
 
     def bias(self, theta: ArrayLike, theta_dot: ArrayLike) -> Array:
-        """Return the motor torques of a motion at constant motor rates [N m], (..., 2)."""
+        """Return the motor torques needed at constant motor rates [N m], (..., 2)."""
         theta, w = _pairs(theta=theta, theta_dot=theta_dot)
         return np.stack(self._chain.bias(self._chain.pose(*_split(theta)), *_split(w)), axis=-1)
 
@@ -136,7 +137,8 @@ class LegDynamics:
         M = self.mass_matrix(theta)
         J_inv = np.linalg.inv(kinematics.jacobian(self.leg, theta, self.assembly))
         product = np.einsum("...ji,...jk,...kl->...il", J_inv, M, J_inv)
-        return 0.5 * (product + np.swapaxes(product, -1, -2))  # they differ by rounding
+        # The product is symmetric but for rounding; callers may rely on it.
+        return 0.5 * (product + np.swapaxes(product, -1, -2))
 
     def simulate(
         self,
@@ -178,11 +180,11 @@ class LegDynamics:
         *,
         friction: float = 0.0,
     ) -> Array:
-        """Return the motor torques of MuJoCo's own steps along a motion [N m], (..., N, 2)."""
+        """Return the motor torques for MuJoCo's own steps along a motion [N m], (..., N, 2)."""
         return stepwise.step_chain(self._chain, q, timestep, foot_force, friction)
 
     def soft_loop(self, q: ArrayLike, timestep: float, damping: float) -> Array:
-        """Return the motion that the loop of `implicitfast` lets through [rad], (N + 1, 4)."""
+        """Return the motion with the loop gap that `implicitfast` needs [rad], (N + 1, 4)."""
         return stepwise.soften(self._chain, q, timestep, damping)
 
 
@@ -194,7 +196,7 @@ def _chain(leg: FiveBar, assembly: int | None, payload: float) -> Chain:
 
 
 def _pairs(**values: ArrayLike) -> list[Array]:
-    """Return the values as finite pairs of one shape (..., 2); ArgumentError if they are not."""
+    """Return the values broadcast to finite pairs (..., 2); ArgumentError if they are not."""
     return together(**{name: finite(as_pairs(v, name), name) for name, v in values.items()})
 
 
@@ -204,7 +206,8 @@ def _split(pairs: Array) -> Vector:
 
 
 def _refuse(sine: Array, where: str) -> None:
-    """Raise if the sine of the angle between two links is no more than rounding."""
+    """Raise if the sine of the angle between two links is within rounding of 0."""
+    # Written so that NaN is singular too.
     singular = np.logical_not(np.abs(sine) > SINGULAR)
     if singular.any():
         index = first_index(singular)

@@ -22,13 +22,13 @@ from fivebar_sim.geometry import FiveBar
 
 Law = Callable[[float, Array, Array], ArrayLike]
 """(t [s], theta, theta_dot) -> torques (tau_A, tau_E) [N m] or forces (x, z) [N]; arrays have the
-shape (..., 2) of the simulated legs, and the result broadcasts with them. It holds no state: it is
-called several times a step."""
+shape (..., 2) of the simulated legs, and the result broadcasts with them. A law must not keep
+state: it is called several times a step."""
 
 
 TURN_MAX = 0.5
-"""A fixed step in which a motor turns by more resolves nothing [rad]: the method's order is lost
-at far less, and beside a singular pose a first wrong step is that large."""
+"""Largest turn of a motor in a fixed step [rad]. The method loses its order at far less, and the
+first wrong step beside a singular pose is that large."""
 
 
 class Motion(NamedTuple):
@@ -60,18 +60,18 @@ def simulate(
 ) -> Motion:
     """Return the motion of any number of legs by the classic Runge-Kutta method of order 4.
 
-    The error falls with timestep^4 once the step resolves the fastest motion; it is not estimated,
-    and beside a singular pose some steps may be wrong before one is refused: watch the energy.
+    The error falls with timestep^4 once the step resolves the fastest motion. It is not estimated,
+    and near a singular pose some steps may be wrong before an error is raised: watch the energy.
 
     Args:
         leg: The leg; all states are of this one.
         theta: (theta_A, theta_E) at t = 0 [rad], (..., 2).
         theta_dot: At t = 0 [rad/s], broadcasts with theta.
         timestep: h [s].
-        steps: How many.
+        steps: Number of steps.
         torque: Law of the motor torques; None: the motors are free.
-        foot_force: What the world does to the foot; None: nothing.
-        every: How many steps are between two rows of the result.
+        foot_force: Law of the force of the world on the foot; None: no force.
+        every: Number of steps between two rows of the result.
         assembly: +1 or -1; None is the leg's own.
         payload: Point mass at F [kg].
 
@@ -79,12 +79,12 @@ def simulate(
         The motion at t = 0, every h, 2 every h, ...
 
     Raises:
-        LoopOpenError: Where the links do not meet at t = 0.
-        SingularError: Where B, C and D are in line at t = 0.
+        LoopOpenError: The links do not meet at t = 0.
+        SingularError: B, C and D are in line at t = 0.
         DivergedError: A leg's loop opens or it becomes singular, a motor turns by more than
             `TURN_MAX` in a step, or a law returns NaN; `.time` is the start of that step.
-        ArgumentError: As `inverse`; a timestep or numbers of steps that are not positive, a law
-            whose result has the wrong shape.
+        ArgumentError: As `inverse`; or a timestep or a number of steps that is not positive, or a
+            law whose result has the wrong shape.
     """
     chain = Chain.of(leg, assembly, payload)
     return simulate_chain(chain, theta, theta_dot, timestep, steps, torque, foot_force, every)
@@ -100,14 +100,15 @@ def simulate_chain(
     foot_force: Law | None,
     every: int,
 ) -> Motion:
-    """Return what `simulate` returns, of a leg's constants."""
+    """Return what `simulate` returns, given a leg's constants."""
     check_number("timestep", timestep, "s", low=0.0, strict=True)
     for name, count in (("steps", steps), ("every", every)):
         if not isinstance(count, (int, np.integer)) or count < 1:
             raise ArgumentError(f"{name} must be a whole number of at least 1, got {count!r}")
     q, w = _start(theta, theta_dot)
     plant = _Plant(chain, torque, foot_force)
-    plant.chain.pose(q[..., 0], q[..., 1])  # the errors of a bad start, as themselves
+    # A bad start raises its own error here, not one of a motion that diverged.
+    plant.chain.pose(q[..., 0], q[..., 1])
     return _runge_kutta(plant, q, w, timestep, range(0, steps + 1, every), steps)
 
 
@@ -130,10 +131,10 @@ def integrate(
         leg: The leg.
         theta: (theta_A, theta_E) at the first time [rad], (2,).
         theta_dot: At the first time [rad/s], (2,).
-        times: Where the motion is wanted, rising [s], (N,); between two steps of the integrator it
-            is interpolated at order 7.
+        times: Times of the rows of the result, increasing [s], (N,); between two steps of the
+            integrator the motion is interpolated with order 7.
         torque: Law of the motor torques, smooth in all arguments; None: the motors are free.
-        foot_force: What the world does to the foot, as smooth; None: nothing.
+        foot_force: Law of the force of the world on the foot, as smooth; None: no force.
         rtol: Relative error of a step, at least 2.3e-14.
         atol: Absolute error of a step [rad, rad/s].
         assembly: +1 or -1; None is the leg's own.
@@ -142,9 +143,9 @@ def integrate(
     Raises:
         LoopOpenError: The links do not meet at times[0].
         SingularError: B, C and D are in line at times[0].
-        DivergedError: The motion runs into a singular pose, or a law gives NaN; `.time` is how far
-            the integrator came.
-        ArgumentError: As `simulate`; more than one leg, times that do not rise.
+        DivergedError: The motion runs into a singular pose, or a law returns NaN; `.time` is the
+            last time that the integrator reached.
+        ArgumentError: As `simulate`; or more than one leg, or times that do not increase.
     """
     chain = Chain.of(leg, assembly, payload)
     return integrate_chain(chain, theta, theta_dot, times, torque, foot_force, rtol, atol)
@@ -160,7 +161,7 @@ def integrate_chain(
     rtol: float,
     atol: float,
 ) -> Motion:
-    """Return what `integrate` returns, of a leg's constants."""
+    """Return what `integrate` returns, given a leg's constants."""
     q, w = _start(theta, theta_dot)
     if q.shape != (2,):
         raise ArgumentError(f"theta must be of one leg, (2,), got {q.shape}; see simulate")
@@ -169,6 +170,7 @@ def integrate_chain(
     if t.ndim != 1 or t.size < 2 or not np.all(np.diff(t) > 0.0):
         raise ArgumentError("times must rise, at least two of them, shape (N,)")
 
+    # DOP853 itself raises a smaller rtol to this, with a warning.
     check_number("rtol", rtol, "", low=100 * np.finfo(float).eps, high=1.0)
     check_number("atol", atol, "rad", low=0.0, high=1.0)
     plant = _Plant(chain, torque, foot_force)
@@ -184,7 +186,7 @@ class _UnfitError(Exception):
 
 @dataclass(frozen=True, slots=True)
 class _Plant:
-    """A leg and what drives it."""
+    """A leg with the laws of its torques and its foot force."""
 
     chain: Chain
     torque: Law | None
@@ -204,7 +206,7 @@ class _Plant:
     def slope(self, t: float, y: Array) -> Array:
         """Return dy/dt of one leg's y = (theta, theta_dot); NaN where the loop is open or singular.
 
-        A trial step beyond a fold of the loop is then refused by the error control, and shortened.
+        The error control then rejects a trial step beyond a fold of the loop and shortens it.
         """
         # Plain numbers: arithmetic on NumPy's takes three times as long.
         theta_A, theta_E, w_A, w_E = y.tolist()
@@ -222,7 +224,7 @@ class _Plant:
 
 
 def _evaluate(law: Law | None, name: str, t: float, q: Array, w: Array) -> Vector | None:
-    """Return both coordinates of a law's value, or None without a law."""
+    """Return both coordinates of a law's result, or None without a law."""
     if law is None:
         return None
     value = as_pairs(law(t, q, w), name)
@@ -251,7 +253,8 @@ def _runge_kutta(plant: _Plant, q: Array, w: Array, h: float, rows: range, steps
     motion.theta_dot[0] = w
     for k in range(steps):
         try:
-            with np.errstate(over="ignore", invalid="ignore"):  # the check sees what they leave
+            # An overflow leaves inf or NaN, which `_check_turn` rejects.
+            with np.errstate(over="ignore", invalid="ignore"):
                 after, w = _step(plant, k * h, q, w, h)
             _check_turn(after - q)
         except (LoopOpenError, SingularError, _UnfitError) as error:
@@ -267,7 +270,8 @@ def _runge_kutta(plant: _Plant, q: Array, w: Array, h: float, rows: range, steps
 
 
 def _check_turn(turn: Array) -> None:
-    """Raise unless every motor turned by a small angle in a step, which NaN is not."""
+    """Raise unless every motor turned by less than `TURN_MAX` in a step."""
+    # Written so that NaN is too large as well.
     lost = np.logical_not((np.abs(turn) < TURN_MAX).all(axis=-1))
     if lost.any():
         raise _UnfitError(
@@ -304,7 +308,8 @@ def _stack_accelerations(plant: _Plant, t: float, q: Array, w: Array) -> Array:
 
 def _dop853(plant: _Plant, y: Array, times: Array, rtol: float, atol: float) -> Array:
     """Return the states of one leg at the given times, (N, 4)."""
-    from scipy.integrate import DOP853  # the only use of scipy in dynamics, and slow to import
+    # The only use of scipy in dynamics, and slow to import.
+    from scipy.integrate import DOP853
 
     states = np.empty((len(times), 4))
     row = 1
@@ -320,7 +325,7 @@ def _dop853(plant: _Plant, y: Array, times: Array, rtol: float, atol: float) -> 
                 raise _UnfitError("no step is short enough: are B, C and D in line?")
             inside = int(np.searchsorted(times, reached, side="right"))
             if inside > row:
-                # Not for every step: the interpolant costs three evaluations.
+                # Only for steps with rows in them: the interpolant costs three evaluations.
                 states[row:inside] = solver.dense_output()(times[row:inside]).T
                 row = inside
     except _UnfitError as error:

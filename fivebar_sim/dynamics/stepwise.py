@@ -1,7 +1,7 @@
-"""The closed chain in MuJoCo's own steps: what a motion given at the times k h takes.
+"""The closed chain in MuJoCo's own steps: torques for a motion given at the times k h.
 
-Rates and accelerations of all links are those of the step from k to k + 1, with psi the links'
-directions as in `chain`, at rest before the first:
+Rates and accelerations of all links are those of the step from k to k + 1, with psi the directions
+of the links as in `chain`, and the leg at rest before the first step:
 
     w+[k] = (psi[k+1] - psi[k]) / h,   w[k] = w+[k-1],  w[0] = 0,   alpha[k] = (w+ - w) / h
 """
@@ -37,9 +37,9 @@ def step_torques(
 
         tau = G^T (H(psi) alpha + c(psi, w) - Q(psi)) - J^T F + friction sign(theta_dot+)
 
-    with G at psi = psi[k]. MuJoCo's step is M (v+ - v) / h + bias = tau + constraint, M, bias and
-    forces at the step's start; the four rates need not fit the closed loop, nor the loop be quite
-    closed. For h -> 0 it is `inverse`.
+    with G at psi = psi[k]. MuJoCo's step is M (v+ - v) / h + bias = tau + constraint, with M, bias
+    and forces at the start of the step. The four rates need not fit the closed loop, and the loop
+    may have a small gap. For h -> 0 the result is that of `inverse`.
 
     Args:
         leg: The leg.
@@ -54,7 +54,7 @@ def step_torques(
         (tau_A, tau_E) of the steps from k = 0..N - 1 [N m], (..., N, 2).
 
     Raises:
-        SingularError: Where B, C and D are in line.
+        SingularError: B, C and D are in line.
         ArgumentError: Shapes that do not fit, numbers that are not finite, fewer than two rows,
             a timestep that is not positive, negative payload or friction.
     """
@@ -64,7 +64,7 @@ def step_torques(
 def step_chain(
     chain: Chain, q: ArrayLike, timestep: float, foot_force: ArrayLike | None, friction: float
 ) -> Array:
-    """Return what `step_torques` returns, of a leg's constants."""
+    """Return what `step_torques` returns, given a leg's constants."""
     check_number("friction", friction, "N m", low=0.0)
     steps = _Steps.of(_rows(q), timestep)
     force = _forces((0.0, 0.0) if foot_force is None else foot_force, steps.psi[0].shape)
@@ -84,21 +84,21 @@ def step_chain(
 def soft_loop(
     leg: FiveBar, q: ArrayLike, timestep: float, damping: float, *, payload: float = 0.0
 ) -> Array:
-    """Return the motion that the loop of `implicitfast` lets through: L4, L3 trail behind L1, L2.
+    """Return the motion with the loop gap that `implicitfast` needs: L4, L3 trail behind L1, L2.
 
-    MuJoCo finds the force that holds the loop from M, then steps with M + h D, D the damping of A
-    and E: what the constraint takes for the links' acceleration is not alpha but
+    MuJoCo computes the loop's force with M, but steps with M + h D, where D is the damping of A
+    and E. So the acceleration of the links that the constraint sees is not alpha but
 
         alpha' = M^-1 (M + h D) alpha,   so   gap_ddot(alpha') = -b gap_dot - k gap
 
-    with k and b of `integrator.pull`, gap_ddot with its centripetal part. A moving leg so opens
-    the loop. The foot sits on L2, so L1 and L2 follow q to the last bit and the foot its path;
-    the equation leaves no choice for L3 and L4, and is solved for them step by step. With
+    with k and b of `integrator.pull`, and gap_ddot including its centripetal part. So a moving leg
+    opens the loop. The foot sits on L2, so L1 and L2 follow q to the last bit and the foot stays on
+    its path; the equation determines L3 and L4, and is solved for them step by step. With
 
         P = sum of L_i ((k - w_i^2) e_i + x_i perp(e_i)),   x = alpha' + b w
 
-    over a side's two links it is P_right = P_left + k (A - E). Left out is the constraint's
-    regularisation: at 1 ms a nanometre of the foot in the air, 0.3 um under 5 N.
+    over a side's two links it is P_right = P_left + k (A - E). The constraint's regularisation is
+    neglected: at 1 ms it moves the foot by a nanometre in the air, by 0.3 um under 5 N.
 
     Args:
         leg: The leg.
@@ -109,18 +109,18 @@ def soft_loop(
         payload: Point mass at F [kg].
 
     Returns:
-        The angles [rad], (N + 1, 4); theta_A and theta_B are those of q, and so is the first row.
+        The angles [rad], (N + 1, 4); theta_A, theta_B and the first row are those of q.
 
     Raises:
-        SingularError: Where E, D and C get in line.
-        DivergedError: Where a link would turn by TURN_MAX in a step.
+        SingularError: E, D and C come in line.
+        DivergedError: A link would turn by TURN_MAX or more in a step.
         ArgumentError: As `step_torques`, or a negative damping.
     """
     return soften(Chain.of(leg, None, payload), q, timestep, damping)
 
 
 def soften(chain: Chain, q: ArrayLike, timestep: float, damping: float) -> Array:
-    """Return what `soft_loop` returns, of a leg's constants."""
+    """Return what `soft_loop` returns, given a leg's constants."""
     check_number("damping", damping, "N m s/rad", low=0.0)
     q = _rows(q)
     if q.ndim != 2:
@@ -147,7 +147,8 @@ class _Steps(NamedTuple):
         A, B, E, D = np.moveaxis(q, -1, 0)
         # Absolute directions L1, L2, L3, L4; the knees turn relative to the inner links.
         psi = np.stack([A, A + B, E + D, E])
-        with np.errstate(over="ignore", invalid="ignore"):  # the check sees what they leave
+        # An overflow leaves inf or NaN, which the check below rejects.
+        with np.errstate(over="ignore", invalid="ignore"):
             w_next = np.diff(psi, axis=-1) / timestep
             # Before the first row nothing moves, as in a run that starts from rest.
             w = np.concatenate([np.zeros_like(w_next[..., :1]), w_next[..., :-1]], axis=-1)
@@ -158,7 +159,7 @@ class _Steps(NamedTuple):
 
 
 def _rows(q: ArrayLike) -> Array:
-    """Return rows of joint angles; ArgumentError unless there are two or more."""
+    """Return the rows of joint angles; ArgumentError unless there are at least two."""
     rows = finite(as_vectors(q, "q", 4), "q")
     if rows.ndim < 2 or rows.shape[-2] < 2:
         raise ArgumentError(f"q must have shape (..., N + 1, 4) with N >= 1, got {rows.shape}")
@@ -166,7 +167,7 @@ def _rows(q: ArrayLike) -> Array:
 
 
 def _forces(force: ArrayLike, shape: tuple[int, ...]) -> Array:
-    """Return foot forces of every step."""
+    """Return the foot force of every step."""
     values = finite(as_pairs(force, "foot_force"), "foot_force")
     try:
         return np.broadcast_to(values, (*shape, 2))
@@ -177,9 +178,9 @@ def _forces(force: ArrayLike, shape: tuple[int, ...]) -> Array:
 
 
 def _pose(chain: Chain, psi: Four) -> Pose:
-    """Return the pose of links that lie in the directions psi, the loop open or closed."""
+    """Return the pose of links with the directions psi; the loop may be open."""
     e1, e2, e3, e4 = ((np.cos(angle), np.sin(angle)) for angle in psi)
-    # The loop may be open by micrometres, so closure is not asked, only this.
+    # The loop may be open by micrometres, so only this is checked, not closure.
     sine = np.abs(cross(e2, e3))
     if not (sine > SINGULAR).all():
         raise _in_line("B, C and D", float(sine.min()), first_index(sine <= SINGULAR))
@@ -221,12 +222,13 @@ def _pull_left(chain: Chain, steps: _Steps, h: float, damping: float) -> Array:
 
 
 def _trail(chain: Chain, pulled: Array, start: Vector, h: float, damping: float) -> Array:
-    """Return (psi_3, psi_4) that trail behind what pulls them [rad], (N + 1, 2)."""
+    """Return (psi_3, psi_4) of the side that the loop pulls along [rad], (N + 1, 2)."""
     psi3, psi4 = start
     w3 = 0.0
     w4 = 0.0
     rows = [start]
 
+    # As plain floats, since arithmetic on single numbers is slow in NumPy.
     for n, row in enumerate(pulled.tolist()):
         e3 = math.cos(psi3), math.sin(psi3)
         e4 = math.cos(psi4), math.sin(psi4)
@@ -288,7 +290,8 @@ def _follow(
     alpha3 = -dot((x, z), e4) / (L3 * sine) - b * w3
 
     # From alpha' back to alpha = (M + h D)^-1 M alpha', where only E, and so row 4, is damped.
-    H43 = L4 * chain.S3[0] * dot(e4, e3)  # L3's mass lies on its line
+    # S3 has no component across, since L3's centre of mass lies on its line.
+    H43 = L4 * chain.S3[0] * dot(e4, e3)
     share = h * damping / (chain.I3 * chain.I4 - H43 * H43)
     alpha4 /= 1.0 + share * chain.I3
     alpha3 += share * H43 * alpha4
