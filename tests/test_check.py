@@ -183,7 +183,7 @@ def test_wrong_use_is_one_line(recorded: Shell) -> None:
     said = recorded.refused("check", "short.toml", "--update", "--set", "duration=0.7")
     assert said == "--update records scenarios as their files say: leave out --set"
     said = recorded.refused("check", "short.toml", "short.toml")
-    assert said == "two scenarios are called 'short': their verdicts would be one"
+    assert said == "two scenarios are called 'short': give each its own name"
     BASELINE.write_text('{"metrics": {"tracking": 1}}', encoding="utf-8")
     said = recorded.refused("check", "short.toml")
     assert said == f"{BASELINE} is no baseline: made must be a table, got None"

@@ -77,7 +77,7 @@ def test_replay_starts_the_viewer_on_loopback(
 
 def test_port_is_refused_where_it_is_of_no_use(recorded: Shell) -> None:
     assert recorded.refused("replay", "mine", "--port", "8000") == (
-        "--port is of --web, got --port 8000 alone"
+        "--port needs --web, got --port 8000 alone"
     )
     said = recorded.refused("replay", "mine", "--web", "--port", "70000")
     assert said == "--port must be in [0, 65535], got 70000"

@@ -28,20 +28,20 @@ def check(
     keep: Annotated[Path, arg(metavar="DIR")] = Path("runs/failed"),
     quiet: bool = False,
 ) -> int:
-    """Run scenarios against limits, guards and baselines; exit status 1 if any is broken.
+    """Check scenarios against limits, guards and baselines; exit status 1 if any is broken.
 
-    The baseline of FILE.toml is baselines/FILE.json beside it: what the metrics were, and how far
-    each may move. A metric that got worse than that fails; one that got better is reported. Without
-    a baseline the limits alone decide.
+    The baseline of FILE.toml is baselines/FILE.json beside it: recorded metrics, and how far each
+    may move. A metric that got worse by more fails; one that got better is reported. Without a
+    baseline only the limits and guards decide.
 
     Args:
-        scenarios: Names of shipped scenarios or paths of TOML files; none: all that ship.
-        settings: Change one key of every scenario, as sim.timestep=0.0005; repeats.
-        update: Record what is measured as the new baselines, of all runs that keep their limits.
+        scenarios: Names of shipped scenarios or paths of TOML files; by default all shipped ones.
+        settings: Change one key of every scenario, e.g. sim.timestep=0.0005; may be repeated.
+        update: Record the measured metrics as new baselines, for all runs within their limits.
         junit: Write the verdicts as JUnit XML.
         summary: Append the verdicts as Markdown, for the page of a CI job ("$GITHUB_STEP_SUMMARY").
-        keep: Where the run directories of failed scenarios go, each under its name; one there is
-            replaced when its scenario fails again, and never deleted.
+        keep: Folder for the run directories of failed scenarios, each under its name; replaced when
+            the scenario fails again, never deleted.
         quiet: Print nothing but errors.
     """
     from fivebar_sim.cli import console
@@ -50,6 +50,7 @@ def check(
 
     _check_options(keep, updates_changed=update and bool(settings))
     sources = scenarios or tuple(resources.shipped("scenarios"))
+    # Everything that can be refused is refused here, before minutes of simulation.
     plans = plans_of(sources, settings)
     _check_names(plans)
     places = [baseline.place(source) for source in sources]
@@ -63,6 +64,7 @@ def check(
     if update:
         checked = [_update(*each) for each in zip(checked, results, olds, places, strict=True)]
 
+    # All runs are kept before any status counts: one that cannot be written must not hide others.
     kept = [_keep(each, result, keep) for each, result in zip(checked, results, strict=True)]
     status = max(_status(each, ok=ok) for each, ok in zip(checked, kept, strict=True))
     if not quiet:
@@ -73,7 +75,7 @@ def check(
 
 
 def _publish(checked: list[Checked], junit: Path | None, summary: Path | None) -> None:
-    """Write the verdicts for a CI job, where it asked for them."""
+    """Write the verdicts for a CI job, if requested."""
     from fivebar_sim.files import whole_file
     from fivebar_sim.regression import ci_files
 
@@ -84,7 +86,7 @@ def _publish(checked: list[Checked], junit: Path | None, summary: Path | None) -
 
 
 def _check_options(keep: Path, *, updates_changed: bool) -> None:
-    """Raise where options contradict each other, or name no place."""
+    """Raise if options contradict each other, or --keep names no directory."""
     if updates_changed:
         raise ConfigError("--update records scenarios as their files say: leave out --set")
     if keep == Path():
@@ -92,34 +94,36 @@ def _check_options(keep: Path, *, updates_changed: bool) -> None:
 
 
 def _check_places(junit: Path | None, summary: Path | None) -> None:
-    """Raise where the verdicts cannot be written, before anything is simulated."""
+    """Raise if the verdicts cannot be written."""
     from fivebar_sim.files import whole_file
 
     if junit is not None:
         whole_file.check_place(junit)
     if summary is not None:
+        # A CI job's summary is shared by its steps, so it is only ever appended to.
         whole_file.append(summary, "")
 
 
 def _check_names(plans: list[Plan]) -> None:
-    """Raise if two scenarios have one name, by which a verdict is told."""
+    """Raise if two scenarios have the same name: it identifies their verdicts."""
     names = [planned.scenario.name for planned in plans]
     for name in names:
         if names.count(name) > 1:
-            raise ConfigError(f"two scenarios are called {name!r}: their verdicts would be one")
+            raise ConfigError(f"two scenarios are called {name!r}: give each its own name")
 
 
 def _results(plans: list[Plan]) -> list[Result | DivergedError]:
-    """Return what came of every plan; one that breaks down does not hide the others."""
+    """Return every plan's result, or the error of one that diverges."""
     from fivebar_sim import rollout
 
     try:
         return [*rollout.run_all(plans, nthread=0)]
+    # The batch ends as a whole; one by one the others still get their verdicts, bit for bit.
     except DivergedError:
-        return [_alone(planned) for planned in plans]
+        return [_run_alone(planned) for planned in plans]
 
 
-def _alone(planned: Plan) -> Result | DivergedError:
+def _run_alone(planned: Plan) -> Result | DivergedError:
     from fivebar_sim import rollout
 
     try:
@@ -129,7 +133,7 @@ def _alone(planned: Plan) -> Result | DivergedError:
 
 
 def _judge(planned: Plan, result: Result | DivergedError, old: Baseline | None) -> Checked:
-    """Return a scenario's verdict; that it broke down is said at once."""
+    """Return a scenario's verdict; print the error of one that diverged."""
     from fivebar_sim.regression import comparison
 
     if isinstance(result, DivergedError):
@@ -142,7 +146,7 @@ def _judge(planned: Plan, result: Result | DivergedError, old: Baseline | None) 
 def _update(
     checked: Checked, result: Result | DivergedError, old: Baseline | None, place: Path
 ) -> Checked:
-    """Record a run that keeps its limits as the new baseline; return the verdict that is left."""
+    """Record a run within its limits as the new baseline; return the updated verdict."""
     from fivebar_sim.regression import baseline, comparison
 
     if isinstance(result, DivergedError) or result.verdict != "pass":
@@ -156,9 +160,9 @@ def _update(
 
 
 def _keep(checked: Checked, result: Result | DivergedError, folder: Path) -> bool:
-    """Write the run directory of a scenario that failed, if it has one; return False if it can't.
+    """Write the run directory of a failed scenario and note where; return False if it cannot.
 
-    A note says where it is.
+    A scenario that passed, or diverged, has nothing to write.
     """
     if not checked.failures or isinstance(result, DivergedError):
         return True

@@ -1,4 +1,4 @@
-"""What the commands share: their arguments' types, their plans, and what they print to."""
+"""Shared by the commands: the types of their arguments, plans, consoles."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ Settings = UseAppendAction[Annotated[tuple[str, ...], arg(name="set", metavar="K
 
 
 def plans_of(scenarios: Iterable[str], settings: Sequence[str]) -> list[Plan]:
-    """Return the plans of all scenarios: everything is validated before the first one runs."""
+    """Return the plans of all scenarios, so that all are validated before the first one runs."""
     from fivebar_sim import rollout
     from fivebar_sim.files import resources
     from fivebar_sim.scenario import Scenario
@@ -27,6 +27,7 @@ def plans_of(scenarios: Iterable[str], settings: Sequence[str]) -> list[Plan]:
     chosen = list(scenarios) or list(resources.shipped("scenarios"))
     loaded = [(source, Scenario.load(source, settings)) for source in chosen]
     plans = []
+    # Planning allocates arrays for every step already, so memory is checked before.
     memory.check(sum(scenario.steps for _, scenario in loaded))
 
     for source, scenario in loaded:
@@ -38,24 +39,26 @@ def plans_of(scenarios: Iterable[str], settings: Sequence[str]) -> list[Plan]:
 
 
 def screen(*, stderr: bool = False, quiet: bool = False):
-    """Return a console for stdout, or stderr; a reader that has gone raises BrokenPipeError.
+    """Return a console for stdout or stderr; a closed pipe raises BrokenPipeError.
 
-    What is printed is plain before it gets its colours, and no word becomes a picture.
+    Text is made plain (see `plain`) before it is coloured; ":words:" do not become emoji.
     """
     from rich.console import Console, ConsoleOptions, RenderableType
     from rich.segment import Segment
 
     class Screen(Console):
-        def on_broken_pipe(self) -> None:  # rich itself would exit with 1, as if a limit failed
+        def on_broken_pipe(self) -> None:
+            # rich itself would exit with status 1, as if a limit were broken.
             raise BrokenPipeError
 
         def render(
             self, renderable: RenderableType, options: ConsoleOptions | None = None
         ) -> Iterator[Segment]:
+            # Control segments are rich's own escape codes; all other text may come from a file.
             for part in super().render(renderable, options):
                 yield part if part.control else part._replace(text=plain.plain(part.text))
 
-    stream = plain.behind(sys.stderr if stderr else sys.stdout)
+    stream = plain.unwrap(sys.stderr if stderr else sys.stdout)
     return Screen(file=stream, quiet=quiet, emoji=False)
 
 

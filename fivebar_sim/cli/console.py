@@ -1,4 +1,4 @@
-"""What people read of a run: tables in mm, um, mN m and percent."""
+"""Tables for people: metrics in mm, um, mN m and percent."""
 
 from __future__ import annotations
 
@@ -20,29 +20,30 @@ if TYPE_CHECKING:
     from fivebar_sim.rollout import Result
 
 WIDEST = 300
-"""Columns of a table that goes into a file or a pipe, at most; there it takes what it needs."""
+"""Widest table in a file or a pipe, in characters; there a table takes what it needs."""
 
 
 def verdict(ok: bool) -> str:
-    """Return the word for a verdict, coloured for a terminal."""
+    """Return "pass" or "FAIL" with rich's colour tags."""
     return "[green]pass[/green]" if ok else "[red]FAIL[/red]"
 
 
 def print_result(result: Result, where: str, console: Console) -> None:
-    """Print one run: every metric, its limit where it has one, the verdict, and where it lies."""
+    """Print one run: its metrics with their limits, the verdict, and the run directory."""
     limits = {limit.key: limit for limit in result.limits}
     title = f"{result.scenario.name}: {result.scenario.leg.name} leg"
     table = _table(escape(title), ("metric", "value", "limit", "verdict"))
     for key, (label, _, _) in SHOWN.items():
         limit = limits.get(key)
+        # Runs in the air have no table `ground`; a metric with a limit is always shown.
         if key.split(".")[0] not in result.metrics or not (limit or _matters(key, result)):
             continue
         judged = (bounds(limit), verdict(limit.ok)) if limit else ("", "")
         table.add_row(label, shown(key, look_up(result.metrics, key)), *judged)
 
     console.print(table)
-    for said in guards.tripped(result.metrics["guards"]):
-        console.print(f"[red]{said}[/red]", soft_wrap=True)
+    for message in guards.tripped(result.metrics["guards"]):
+        console.print(f"[red]{message}[/red]", soft_wrap=True)
 
     console.print(
         f"verdict: {verdict(result.verdict == 'pass')}   written to {escape(where)}", soft_wrap=True
@@ -50,14 +51,14 @@ def print_result(result: Result, where: str, console: Console) -> None:
 
 
 def _matters(key: str, result: Result) -> bool:
-    """Return whether a metric without a limit is worth a line."""
+    """Return whether to show a metric that has no limit."""
     if key in HIDDEN_AT_ZERO:
         return bool(look_up(result.metrics, key))
     return key not in DETAILS
 
 
 def print_check(checked: Sequence[Checked], console: Console) -> None:
-    """Print many runs as one table, the name of each above its metrics; then what stands out."""
+    """Print many runs as one table, each name above its metrics; then failures and notes."""
     columns = ("metric", "limit", "baseline", "now", "change", "verdict")
     table = _table("foot tracking and load against limits and baselines", columns, gap=0)
     for each in checked:
@@ -72,6 +73,7 @@ def print_check(checked: Sequence[Checked], console: Console) -> None:
         elif not each.rows:
             table.add_row(" no limits set", *[""] * 4, verdict(True))
 
+    # A pipe or a file has no width; rich would assume 80 columns and cut long names.
     options = console.options.update(max_width=WIDEST)
     wide = None if console.is_terminal else Measurement.get(console, options, table).maximum
     console.print(table, width=wide, crop=False)
@@ -82,13 +84,13 @@ def print_check(checked: Sequence[Checked], console: Console) -> None:
 
 
 def _word(row: Row) -> str:
-    """Return the word for a metric's verdict, coloured for a terminal."""
+    """Return a metric's verdict with rich's colour tags."""
     plain = row.verdict in ("pass", "FAIL")
     return verdict(row.verdict == "pass") if plain else f"[cyan]{row.verdict}[/cyan]"
 
 
 def _table(title: str, columns: Sequence[str], gap: int = 1) -> Table:
-    """Return an empty table; numbers stand to the right, and nothing wraps at 80 columns."""
+    """Return an empty table: numbers aligned right, no wrapping, for 80 columns."""
     table = Table(title=title, box=box.SIMPLE_HEAD, title_justify="left", padding=(0, gap, 0, 0))
     for column in columns:
         number = column in ("value", "limit", "baseline", "now", "change")

@@ -1,6 +1,6 @@
-"""Whether this process may take the memory that a run needs, asked before anything is simulated.
+"""Check before a simulation that this process may allocate the memory that it needs.
 
-What runs out of it on the way may end in the middle of a library that knows no other way out.
+A library that runs out of memory later may abort the whole process.
 """
 
 from __future__ import annotations
@@ -11,24 +11,25 @@ LEAST = 3 << 30
 """Address space that a short run needs [bytes]: 0.9 GB, and two allocators that take 1 GiB each."""
 
 A_STEP = 1500
-"""Address space that a physics step needs [bytes]: rows of the record and of the recording."""
+"""Address space per physics step [bytes]: rows of the record and of the recording."""
 
 
 def allowed() -> int | None:
-    """Return the address space that the system grants this process [bytes]; None: no such limit."""
+    """Return the limit of this process's address space [bytes]; None: no limit."""
     try:
         import resource
-    except ImportError:  # Windows has none
+    # Windows has no such limits.
+    except ImportError:
         return None
     limit = resource.getrlimit(resource.RLIMIT_AS)[0]
     return None if limit == resource.RLIM_INFINITY else limit
 
 
 def check(steps: int = 0) -> None:
-    """Raise unless a run of some steps may have the address space that it needs.
+    """Raise if the limit of the address space is too small for a run of some steps.
 
     Raises:
-        ConfigError: The limit is below that; says both.
+        ConfigError: It is too small; the message has both numbers.
     """
     limit = allowed()
     needed = LEAST + A_STEP * steps

@@ -1,4 +1,4 @@
-"""Text as it may go out: nothing that a terminal obeys, whoever wrote it; escaped in one place."""
+"""Plain text for terminals: control characters are escaped in one place, whoever wrote them."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ from typing import Any
 
 
 def plain(text: str) -> str:
-    r"""Return a text with everything that cannot be seen told with backslashes: "\x1b", "\u202e".
+    r"""Return a text with every invisible character written as an escape: "\x1b", "\u202e".
 
-    That is control characters, what turns the direction of writing, separators of lines and bytes
-    that are no UTF-8; the ends of lines stay.
+    These are control characters, marks that change the direction of writing, line separators and
+    bytes that are not UTF-8; line breaks stay.
     """
     if text.isprintable():
         return text
@@ -20,11 +20,11 @@ def plain(text: str) -> str:
 
 
 class Plain:
-    """A stream that lets only plain text through; in all else it is the stream behind it.
+    """A stream that writes plain text only, and otherwise behaves like the stream it wraps.
 
     Attributes:
-        styled: Whether colours go through: what is written is known to have no foreign text.
-        stream: What is behind it.
+        styled: Whether colours pass: only while no text of others is written.
+        stream: The wrapped stream.
     """
 
     def __init__(self, stream: Any) -> None:
@@ -32,7 +32,7 @@ class Plain:
         self.stream = stream
 
     def write(self, text: str) -> int:
-        """Write a text, plain."""
+        """Write a text, escaped unless `styled`."""
         return self.stream.write(text if self.styled else plain(text))
 
     def __getattr__(self, name: str) -> Any:
@@ -41,8 +41,9 @@ class Plain:
 
 @contextmanager
 def output() -> Iterator[None]:
-    """Let stdout and stderr be plain."""
+    """Make stdout and stderr plain."""
     with ExitStack() as both:
+        # Without a console, as under pythonw, Python has no streams at all.
         if sys.stdout is not None:
             both.enter_context(redirect_stdout(Plain(sys.stdout)))  # pyright: ignore[reportArgumentType]
         if sys.stderr is not None:
@@ -51,12 +52,12 @@ def output() -> Iterator[None]:
 
 
 def style(*, allowed: bool) -> None:
-    """Let colours through, or no more."""
+    """Switch the colours of stdout and stderr on or off."""
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, Plain):
             stream.styled = allowed
 
 
-def behind(stream: Any) -> Any:
-    """Return the stream behind a plain one, for who writes plain text in colours of his own."""
+def unwrap(stream: Any) -> Any:
+    """Return the stream within a plain one, for a writer that escapes text and adds colours."""
     return stream.stream if isinstance(stream, Plain) else stream

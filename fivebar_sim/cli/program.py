@@ -1,4 +1,7 @@
-"""The program `fivebar`: parses and calls; exit status 0 fine, 1 failed, 2 bad input."""
+"""The program `fivebar`: parses arguments and calls a command.
+
+Exit status: 0 fine, 1 failed, 2 bad input; `status` has all of them.
+"""
 
 from __future__ import annotations
 
@@ -16,7 +19,7 @@ from fivebar_sim.cli.status import FAILED, INTERRUPTED, UNREAD, WRONG, say
 from fivebar_sim.errors import DivergedError, FiveBarError
 
 COMMANDS = ("run", "check", "replay", "report", "render", "view", "workspace")
-"""Each in the module of its name in `fivebar_sim.cli`."""
+"""The commands; each is a function in the module of its name in `fivebar_sim.cli`."""
 
 HELP = {"-h", "--help"}
 
@@ -24,17 +27,19 @@ HELP = {"-h", "--help"}
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command line; return its exit status."""
     args = list(sys.argv[1:] if argv is None else argv)
+    # A name may have letters that the terminal's encoding lacks: they must not end the program.
     if isinstance(sys.stdout, io.TextIOWrapper):
-        sys.stdout.reconfigure(errors="backslashreplace")  # any name, in any terminal's encoding
+        sys.stdout.reconfigure(errors="backslashreplace")
     with plain.output():
         return _main(args)
 
 
 def _main(args: list[str]) -> int:
-    """Call the command; say in one line what is wrong."""
+    """Call the command; report an error in one line."""
     try:
-        with signals.heard():
+        with signals.listen():
             status = _call(args)
+        # Flushed here, where a closed pipe is still caught, not when Python exits.
         if sys.stdout:
             sys.stdout.flush()
         return status
@@ -47,7 +52,9 @@ def _main(args: list[str]) -> int:
     except FiveBarError as error:
         say(error)
         return WRONG
-    except BrokenPipeError:  # who reads has gone, as in `fivebar check | head`
+    # The reader has gone, as in `fivebar check | head`. What is still buffered goes to /dev/null:
+    # otherwise Python fails once more when it flushes at its end.
+    except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return UNREAD
     except OSError as error:
@@ -59,17 +66,20 @@ def _main(args: list[str]) -> int:
 
 
 def _call(args: list[str]) -> int:
-    """Parse the arguments and call their command; all else is imported here, within `main`."""
+    """Parse the arguments and call the command."""
     if args == ["--version"]:
         print(f"fivebar-sim {version('fivebar-sim')}")  # noqa: T201
         return 0
 
+    # Help needs no memory to speak of.
     if not HELP & set(args):
         memory.check()
 
+    # Imported late, so that errors and signals during the import are reported like all others.
     import tyro
 
-    plain.style(allowed=all(arg.isprintable() for arg in args))  # the parser quotes them
+    # The parser colours its messages and quotes the arguments in them.
+    plain.style(allowed=all(arg.isprintable() for arg in args))
     return tyro.extras.subcommand_cli_from_dict(
         {name: _command(name) for name in COMMANDS},
         prog="fivebar",
@@ -80,7 +90,7 @@ def _call(args: list[str]) -> int:
 
 
 def _command(name: str) -> Callable[..., int]:
-    """Return the function of a command; what it prints is plain."""
+    """Return the function of a command, wrapped so that it prints plain text."""
     function = getattr(importlib.import_module(f"fivebar_sim.cli.{name}"), name)
 
     @functools.wraps(function)

@@ -23,23 +23,24 @@ def render(
 ) -> int:
     """Draw a run: the leg, its target path, the foot's trail and the ground's force.
 
-    A .gif shows the last whole period of a periodic path and starts over without a jump; a .mp4
-    (by the program ffmpeg) shows all of the run; a .png one moment.
+    A .gif shows the last whole period of a periodic path and repeats without a jump; a .mp4 (which
+    needs the program ffmpeg) shows the whole run; a .png shows one moment.
 
     Args:
         run_dir: A run directory that `fivebar run` wrote.
         out: The picture, .gif, .mp4 or .png (default NAME.gif, in the current folder).
         fps: Frames a second, at most 50 in a .gif.
-        speed: Of the run's time over the clock's; 0.25 is four times slower than real time.
-        width: Of the picture [pixels].
-        height: Of the picture [pixels].
-        at: Moment of a .png [s] (default: the middle of the run).
+        speed: Simulated time over time on screen; 0.25 is four times slower than real time.
+        width: Width of the picture [pixels].
+        height: Height of the picture [pixels].
+        at: Time of a .png [s] (default: the middle of the run).
     """
     from fivebar_sim.render import gl
     from fivebar_sim.runs import stored
 
     run = stored.read(run_dir)
-    gl.find()  # before mujoco is imported, which fails where MUJOCO_GL names what is not there
+    # Before mujoco is imported: that fails where MUJOCO_GL names a GL that is not installed.
+    gl.find()
 
     from fivebar_sim.render import film as render
     from fivebar_sim.render.replay import replay

@@ -15,24 +15,24 @@ RunDirs = Positional[Annotated[tuple[Path, ...], arg(metavar="[RUN_DIR ...]")]]
 
 
 def replay(run_dir: RunDir, others: RunDirs = (), /, *, web: bool = False, port: int = 0) -> int:
-    """Open the recording of a run in the Rerun viewer, or several over each other; here only.
+    """Open the recording of a run in the Rerun viewer, or several overlaid; on this machine only.
 
     Args:
         run_dir: A run directory that `fivebar run` wrote.
-        others: More of them, to be shown over the first and told apart by colour.
-        web: Serve it to a browser on this machine, until Ctrl-C, instead of opening a window.
-        port: Where --web serves; 0 is any port that is free.
+        others: More run directories, overlaid on the first in other colours.
+        web: Serve the recording to a browser on this machine until Ctrl-C; open no window.
+        port: Port of --web; 0 takes any free port.
     """
     run_dirs = (run_dir, *others)
     if web:
         return _serve(run_dirs, port)
     if port:
-        raise ConfigError(f"--port is of --web, got --port {port} alone")
+        raise ConfigError(f"--port needs --web, got --port {port} alone")
     return _show(run_dirs)
 
 
 def _show(run_dirs: tuple[Path, ...]) -> int:
-    """Show the recording in the native viewer, until it is closed."""
+    """Show the recording in the native viewer until its window is closed."""
     import subprocess
 
     from fivebar_sim.recording import viewer
@@ -46,7 +46,7 @@ def _show(run_dirs: tuple[Path, ...]) -> int:
 
 
 def _serve(run_dirs: tuple[Path, ...], port: int) -> int:
-    """Serve the recording to browsers, until Ctrl-C, which is the way to end it: status 0."""
+    """Serve the recording to browsers until Ctrl-C, which is the normal end: status 0."""
     from fivebar_sim.cli import signals
     from fivebar_sim.recording import web
     from fivebar_sim.runs import recording_file
@@ -59,6 +59,7 @@ def _serve(run_dirs: tuple[Path, ...], port: int) -> int:
             print(f"{title}: {server.url} (Ctrl-C ends it)", flush=True)  # noqa: T201
             server.serve_forever()
     except KeyboardInterrupt:
-        signals.answered()
+        # Here Ctrl-C is a wish that was met: `listen` must not raise it once more.
+        signals.acknowledge()
 
     return 0

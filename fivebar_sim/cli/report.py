@@ -18,14 +18,13 @@ def report(
     png: Annotated[Path | None, arg(metavar="DIR")] = None,
     quiet: bool = False,
 ) -> int:
-    """Explain a run, or compare several, on one HTML page that needs nothing else.
+    """Explain a run, or compare several, on one self-contained HTML page.
 
     Args:
-        run_dirs: Run directories that `fivebar run` wrote; of several the differences are to the
-            first.
-        out: The page (default RUN_DIR/report.html, which the next run there deletes; of several
-            comparison.html).
-        png: A folder for the figures as single pictures.
+        run_dirs: Run directories that `fivebar run` wrote; several are compared with the first.
+        out: The page (default: RUN_DIR/report.html, which the next run there deletes; for several
+            runs comparison.html).
+        png: Folder for the figures as separate pictures.
         quiet: Print nothing but errors.
     """
     from fivebar_sim import report as reports

@@ -26,18 +26,18 @@ def run(
     quiet: bool = False,
     json: bool = False,
 ) -> int:
-    """Simulate scenarios, judge them by their limits, write their run directories.
+    """Simulate scenarios, check their limits, write their run directories.
 
-    Exit status: 1 if a limit is broken, a guard trips or a run breaks down, 2 for wrong input.
+    Exit status: 1 if a limit is broken, a guard trips or a run diverges, 2 for wrong input.
 
     Args:
-        scenarios: Names of shipped scenarios or paths of TOML files; none: all that ship.
+        scenarios: Names of shipped scenarios or paths of TOML files; by default all shipped ones.
         out: Run directory of one scenario, or the folder of several (default runs/NAME);
-            a run that is there is replaced.
-        settings: Change one key of every scenario, as leg.L2=0.07 or "path.radii=[0.02, 0.01]";
-            repeats. Another path.kind keeps the keys that both kinds have.
+            an existing run is replaced.
+        settings: Change one key of every scenario, e.g. leg.L2=0.07 or "path.radii=[0.02, 0.01]";
+            may be repeated. A new path.kind keeps the keys that both kinds have.
         live: Show the runs in a new Rerun viewer while they are simulated.
-        live_at: The same in a viewer that listens on this machine already.
+        live_at: Show them in a viewer that already listens on this machine.
         quiet: Print nothing but errors.
         json: Print the metrics as JSON instead of tables.
     """
@@ -45,6 +45,7 @@ def run(
 
     plans = plans_of(scenarios, settings)
     places = _places(plans, out)
+    # A place that cannot be written must not cost a simulation first.
     for place in places:
         directory.check_place(place)
     viewer = _viewer(live_at) if live or live_at is not None else None
@@ -52,18 +53,18 @@ def run(
 
 
 def _viewer(address: str | None) -> str:
-    """Return the address of a viewer that listens; None: of a new one."""
+    """Return the address of a running viewer; if none is given, start one."""
     from fivebar_sim.recording import live
     from fivebar_sim.render.screen import check
 
     if address is not None:
         return live.check_address(address)
-    check("--live-at shows the run in a viewer that listens already")
+    check("--live-at shows the run in a viewer that already listens")
     return live.spawn_viewer()
 
 
 def _execute(planned: Plan, viewer: str | None) -> Result:
-    """Simulate one plan, in sight of a viewer where there is one."""
+    """Simulate one plan, streaming it to a viewer if there is one."""
     from fivebar_sim import rollout
 
     if viewer is None:
@@ -77,7 +78,7 @@ def _execute(planned: Plan, viewer: str | None) -> Result:
 def _run(
     plans: list[Plan], places: list[Path], viewer: str | None, *, quiet: bool, as_json: bool
 ) -> int:
-    """Run the plans one after the other; return the highest status."""
+    """Run the plans one after another; return the highest exit status."""
     import json
 
     from fivebar_sim.cli import console
@@ -91,6 +92,7 @@ def _run(
             with working(f"simulating {name}", quiet=quiet):
                 result = _execute(planned, viewer)
                 result.write(place)
+        # The other scenarios still run.
         except DivergedError as error:
             say(error)
             status = FAILED
@@ -110,7 +112,7 @@ def _places(plans: list[Plan], out: str | None) -> list[Path]:
     """Return the run directory of every plan.
 
     Raises:
-        ConfigError: --out is empty, or two scenarios of one name would write to one place.
+        ConfigError: --out is empty, or two scenarios have the same name and so the same place.
     """
     if out == "":
         raise ConfigError("--out must name a directory, got ''")

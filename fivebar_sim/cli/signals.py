@@ -1,8 +1,8 @@
-"""How signals end the program: Ctrl-C and SIGTERM, heard even where an exception is swallowed.
+"""Ctrl-C and SIGTERM end the program even where an exception gets swallowed.
 
-A handler can only raise, and what it raises is lost where the interpreter or a module in C++ drops
-exceptions: in `__del__`, in callbacks, while some modules are imported. So it is raised again until
-it gets through, and never into what tidies up after it.
+A signal handler can only raise, and its exception is lost where the interpreter or a C++ module
+drops exceptions: in `__del__`, in callbacks, while some modules are imported. So it is raised again
+until it gets through, but never into the clean-up that it caused.
 """
 
 from __future__ import annotations
@@ -15,19 +15,19 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 PATIENCE = 0.2
-"""How long what was raised may take to get through before it is raised again [s]."""
+"""Time that an exception gets to pass through before it is raised again [s]."""
 
 _sent: list[int] = []
-"""The signal that came, if one did: the first one counts."""
+"""The first signal that came, if any."""
 
 
 @contextmanager
-def heard() -> Iterator[None]:
-    """Let Ctrl-C raise KeyboardInterrupt within, and SIGTERM SystemExit, and neither get lost.
+def listen() -> Iterator[None]:
+    """Within, Ctrl-C raises KeyboardInterrupt and SIGTERM SystemExit, and neither gets lost.
 
-    A signal that the program was started with ignored, as Ctrl-C is behind `&` in a script, stays
-    ignored; one that has a handler of somebody else's keeps it. Outside of the main thread, where
-    Python lets nobody handle signals, nothing changes.
+    A signal that was already ignored when the program started, as Ctrl-C is behind `&` in a script,
+    stays ignored; one with a handler of its own keeps it. Outside the main thread, where Python
+    allows no signal handlers, nothing changes.
     """
     if threading.current_thread() is not threading.main_thread():
         yield
@@ -40,7 +40,7 @@ def heard() -> Iterator[None]:
     unraisable = sys.unraisablehook
     ended = threading.Event()
     lock = threading.Lock()
-    # started before any signal comes: a handler may interrupt the starting of another thread
+    # Started before any signal comes: a handler may interrupt the start of a thread.
     threading.Thread(target=_insist, args=(ended, lock), daemon=True).start()
 
     for number in before:
@@ -51,50 +51,56 @@ def heard() -> Iterator[None]:
         yield
     finally:
         try:
-            with lock:  # from here on nothing is raised again
+            # From here on nothing is raised again.
+            with lock:
                 ended.set()
         finally:
             sys.unraisablehook = unraisable
             for number, handler in before.items():
                 signal.signal(number, handler)
-            if _sent:  # whatever came of it: nothing, or what an import made of it
+            # The exception may have been swallowed, or an import may have turned it into another.
+            if _sent:
                 raise _ending(_sent[0]) from None
 
 
-def answered() -> None:
-    """Say that the signal did what it should, so that it is no reason to end otherwise."""
+def acknowledge() -> None:
+    """Forget the signal: the program has done what it asked for."""
     _sent.clear()
 
 
 def _end(number: int, frame: object) -> None:
-    """Raise what the first signal raises, unless it is on its way already."""
+    """Raise the exception of the first signal, unless it is already on its way."""
     if not _sent:
         _sent.append(number)
+    # A second exception would interrupt the clean-up that the first one runs through.
     if not _unwinding(sys.exc_info()[1]):
         raise _ending(_sent[0])
 
 
 def _ending(number: int) -> BaseException:
-    """Return what a signal raises."""
+    """Return the exception of a signal."""
+    # 128 + number is what a shell reports for a program that a signal ended.
     return KeyboardInterrupt() if number == signal.SIGINT else SystemExit(128 + number)
 
 
 def _unwinding(error: BaseException | None) -> bool:
-    """Return whether what a signal raised is on its way, through what tidies up."""
+    """Return whether an exception of a signal is on its way through clean-up code."""
+    # An error in the clean-up itself has the signal's exception as its context.
     while error is not None and not isinstance(error, (KeyboardInterrupt, SystemExit)):
         error = error.__context__
     return error is not None
 
 
 def _quiet(lost: sys.UnraisableHookArgs) -> None:
-    """Tell of an exception that nobody can catch, if it is none of ours."""
+    """Report an exception that nobody can catch, unless it is a signal's."""
     if not (_sent and _unwinding(lost.exc_value)):
         sys.__unraisablehook__(lost)
 
 
 def _insist(ended: threading.Event, lock: threading.Lock) -> None:
-    """Let the handler run again and again, until the program is out of `heard`."""
+    """Run the handler again and again until the program has left `listen`."""
     while not ended.wait(PATIENCE):
         with lock:
+            # Only the main thread may raise; this makes Python call the handler there.
             if _sent and not ended.is_set():
                 _thread.interrupt_main(signal.Signals(_sent[0]))

@@ -1,4 +1,4 @@
-"""How the commands end: exit statuses, and the one line that says why; quick to import."""
+"""Exit statuses, and the one-line message that explains them; quick to import."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ UNREAD = 141
 
 HEAD = 400
 TAIL = 190
-"""Characters that are kept of the begin and the end of a line too long to be read."""
+"""Characters kept from the beginning and from the end of a message that is too long to read."""
 
 
 def say(error: BaseException | str) -> None:
-    """Print one line to stderr, short enough to be read, and nothing that a terminal obeys."""
+    """Print a message to stderr: one short line of plain text."""
     print(f"fivebar: {one_line(str(error))}", file=sys.stderr)  # noqa: T201
 
 
 def one_line(text: str) -> str:
-    """Return a text on one line: what cannot be printed is told with backslashes."""
+    """Return a text as one line, with unprintable characters escaped."""
     line = plain(" ".join(text.split()))
     return line if len(line) <= HEAD + TAIL + 10 else f"{line[:HEAD]} ... {line[-TAIL:]}"

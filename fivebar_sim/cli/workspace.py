@@ -15,12 +15,12 @@ def workspace(
     out: Annotated[str | None, arg(metavar="PNG")] = None,
     path: Annotated[str | None, arg(metavar="SCENARIO")] = None,
 ) -> int:
-    """Draw what a leg's foot reaches: distance to the boundary, and singular curves.
+    """Draw the workspace of a leg: distance to the boundary, and singular curves.
 
     Args:
         leg: A preset's name or a leg's TOML file.
         out: The picture, .png, .svg or .pdf (default workspace-LEG.png).
-        path: A scenario whose foot path is drawn on it.
+        path: A scenario whose foot path is drawn over it.
     """
     from fivebar_sim.geometry import FiveBar
     from fivebar_sim.report import workspace_map
