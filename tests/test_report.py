@@ -277,7 +277,7 @@ def test_damage_is_refused(
 
 
 def test_too_many_or_no_runs() -> None:
-    with pytest.raises(ArgumentError, match="a report is of 1 to 32 runs, got 0"):
+    with pytest.raises(ArgumentError, match="a report needs 1 to 32 runs, got 0"):
         report.write([])
     with pytest.raises(ArgumentError, match="got 33"):
         report.write([Path(str(k)) for k in range(33)])

@@ -1,4 +1,4 @@
-"""A run explained on one HTML page that needs nothing else, or several runs compared on one."""
+"""One self-contained HTML page that explains a run, or compares several."""
 
 from fivebar_sim.report.write import place_of, write
 

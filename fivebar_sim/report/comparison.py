@@ -1,4 +1,4 @@
-"""The page of several runs: what differs in them, metric by metric, and their lines overlaid."""
+"""The page that compares several runs: metrics, differences of the scenarios, figures overlaid."""
 
 from __future__ import annotations
 
@@ -27,31 +27,31 @@ if TYPE_CHECKING:
 COLOURS = 8
 STYLES = ("-", "--", ":", "-.")
 NAME = 0.19
-"""Height of a name above a figure [in]."""
+"""Height of one line of the legend above a figure [in]."""
 
 MOST = COLOURS * len(STYLES)
-"""How many runs can be told apart."""
+"""Most runs that colours and line styles can distinguish."""
 
 
 def names(runs: Sequence[StoredRun]) -> list[str]:
-    """Return what the runs are called: their directories' names, or paths where those are alike."""
+    """Return the runs' names: their directories' names, or their paths if two names are equal."""
     short = [numbers.name_of(run) for run in runs]
     return short if len(set(short)) == len(short) else [str(run.path) for run in runs]
 
 
 def figures(runs: Sequence[StoredRun]) -> list[Drawn]:
-    """Return the figures of runs overlaid; within `look.styled`."""
+    """Return the figures with all runs overlaid; call it within `look.styled`."""
     drawn = [_foot_paths(runs), *(_lines(runs, *each) for each in PLOTS)]
     grounded = [run for run in runs if "ground_z" in run.record]
     return drawn + ([_lines(runs, *GROUND)] if grounded else [])
 
 
 def page(runs: Sequence[StoredRun], drawn: list[Drawn]) -> str:
-    """Return the page that compares runs; within `look.styled`."""
+    """Return the page that compares runs; call it within `look.styled`."""
     called = names(runs)
-    said = f"{len(runs)} runs: {', '.join(called)}. Differences are to the first."
+    summary = f"{len(runs)} runs: {', '.join(called)}. Differences are to the first."
     parts = [
-        f"<header>\n<h1>{text('Comparison of runs')}</h1>\n<p>{text(said)}</p>\n</header>",
+        f"<header>\n<h1>{text('Comparison of runs')}</h1>\n<p>{text(summary)}</p>\n</header>",
         html.section("Metrics", _metrics(runs)),
         html.section("What differs in the scenarios", _differences(runs)),
         html.section("What happened", html.figures(drawn)),
@@ -60,15 +60,17 @@ def page(runs: Sequence[StoredRun], drawn: list[Drawn]) -> str:
 
 
 def _look(k: int, runs: Sequence[StoredRun]) -> dict[str, Any]:
-    """Return how run k is drawn: the first is the widest, so that those on top hide none."""
+    """Return colour, style and width of the lines of run k."""
+    # Later runs are drawn on top, so earlier ones are wider: equal lines stay visible.
     width = 2.6 - 1.6 * k / max(len(runs) - 1, 1)
     return {"color": colour(f"run-{k % COLOURS + 1}"), "ls": STYLES[k // COLOURS], "lw": width}
 
 
 def _legend(figure: Figure, ax: Axes, called: Sequence[str]) -> None:
-    """Name the lines of an axes above the figure; given so, a name may begin with _."""
+    """Name the lines of an axes above the figure."""
     shorter = [name if len(name) <= 40 else f"{name[:18]} ... {name[-18:]}" for name in called]
     lines = [line for line in ax.lines if line.get_gid() == "run"]
+    # Matplotlib leaves out labels that begin with "_", so the names are set afterwards.
     legend = figure.legend(lines, ["" for _ in lines], loc="outside upper center", ncols=1)
     for entry, name in zip(legend.get_texts(), shorter, strict=True):
         entry.set_text(name)
@@ -87,7 +89,7 @@ def _foot_paths(runs: Sequence[StoredRun]) -> Drawn:
     return Drawn(
         "foot-path",
         "Foot paths",
-        "The foot's way in the hip frame; grey: the targets.",
+        "The foot's path in the hip frame; grey: the targets.",
         f"The foot paths of {', '.join(names(runs))} in the leg plane, over their targets.",
         figure,
     )
@@ -107,12 +109,12 @@ def _lines(
     """Draw columns of all runs over time.
 
     Args:
-        runs: What to draw; a run without a column has no line.
-        key: Of the figure.
-        title: Of the figure.
-        caption: Of the figure.
-        columns: Name with unit to the values, a panel each.
-        worst: Whether only the largest value of each moment is drawn, on a scale by powers of ten.
+        runs: The runs; one without a column has no line.
+        key: Key of the figure.
+        title: Title of the figure.
+        caption: Caption of the figure.
+        columns: One panel each: label with unit, and a function that returns the values.
+        worst: Whether to draw only the largest value of each interval, on a logarithmic scale.
     """
     figure, axes = draw.panels(
         *[1.0] * len(columns), height=0.7 + 2.0 * len(columns) + NAME * len(runs)
@@ -134,9 +136,10 @@ def _lines(
 
 
 def _by_powers(ax: Axes, peaks: Sequence[float]) -> None:
-    """Scale an axis by powers of ten, down to a hundredth of the smallest peak that is not 0."""
+    """Make an axis logarithmic, down to a hundredth of the smallest peak above 0."""
     from matplotlib.ticker import FuncFormatter, NullFormatter
 
+    # Zero has no logarithm: with nothing above it the axis stays linear.
     above = [peak for peak in peaks if peak > 0.0]
     if above:
         ax.set_yscale("log")
@@ -171,14 +174,14 @@ PLOTS: tuple[tuple[str, str, str, dict[str, Column], bool], ...] = (
     (
         "tracking-error",
         "Tracking error",
-        "How far the foot is from its target, the largest error of each moment.",
+        "Distance of the foot from its target, the largest value of each interval.",
         {"|foot - target| [mm]": lambda run: 1e3 * tracking_error(run.record)},
         True,
     ),
     (
         "loop-gap",
         "Loop gap",
-        "How far the loop is open at C, the largest gap of each moment.",
+        "Gap of the loop at C, the largest value of each interval.",
         {"gap at C [um]": lambda run: 1e6 * run.record["gap"]},
         True,
     ),
@@ -206,7 +209,7 @@ def _tripped(run: StoredRun) -> Cell:
 
 
 def _metrics(runs: Sequence[StoredRun]) -> str:
-    """Return all metrics of all runs."""
+    """Return the table of all metrics of all runs."""
     head: list[object] = ["metric"]
     for k, name in enumerate(names(runs)):
         tint = f"var(--run-{k % COLOURS + 1})"
@@ -226,6 +229,7 @@ def _metrics(runs: Sequence[StoredRun]) -> str:
                 row.append("")
                 continue
             cell = str(text(shown(key, look_up(run.metrics, key))))
+            # Nothing to compare in the first run, nor where it has no such metric.
             if k and key in numbers.keys(runs[0]):
                 cell += f"<small>{text(difference(key, run, runs[0]))}</small>"
             if key in limits[k] and not limits[k][key].ok:
@@ -237,11 +241,12 @@ def _metrics(runs: Sequence[StoredRun]) -> str:
 
 
 def difference(key: str, run: StoredRun, first: StoredRun) -> str:
-    """Return how a metric of a run differs from the first run's.
+    """Return the difference of a metric to that of the first run, in words.
 
-    In percent of the first run's, or as a multiple from tenfold on; shares of a whole in points,
-    and where the first is 0, or one of them undefined, in words.
+    In percent of the first run's value, or as a multiple from tenfold on; percentages differ in
+    points. "from 0" if the first value is 0, "-" if one of them is undefined.
     """
+    # None is an undefined metric, which equals another undefined one.
     value, base = (look_up(each.metrics, key) for each in (run, first))
     if value is None or base is None or value == base:
         return "same" if value == base else "-"
@@ -255,7 +260,7 @@ def difference(key: str, run: StoredRun, first: StoredRun) -> str:
 
 
 def _differences(runs: Sequence[StoredRun]) -> str:
-    """Return the keys of the scenarios that are not the same in all runs."""
+    """Return the table of the scenario keys that are not the same in all runs."""
     flat = [dict(tables.flat(run.scenario.table())) for run in runs]
     keys = dict.fromkeys(key for each in flat for key in each)
     rows = [

@@ -1,4 +1,4 @@
-"""What the figures are drawn with: panels over time, lines of few points, units, bands."""
+"""Drawing tools for the figures: panels over time, thinned lines, units, shaded bands."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 BINS = 600
-"""Parts of a line over time, each drawn by its least and its largest value."""
+"""Intervals of a line over time; each is drawn by its least and its largest value."""
 
 LENGTHS = ((1e3, "mm"), (1e6, "um"), (1e9, "nm"))
 """Factors from metres, and their units."""
@@ -27,11 +27,11 @@ class Drawn(NamedTuple):
     """One figure.
 
     Attributes:
-        key: Its id in the page, and the name of its picture.
-        title: Its heading.
-        caption: What to see in it.
-        alt: What it shows, for who cannot see it.
-        figure: Itself.
+        key: Id in the page, and name of the picture's file.
+        title: Heading.
+        caption: What to look for.
+        alt: What the figure shows, for readers who cannot see it.
+        figure: Matplotlib's figure.
     """
 
     key: str
@@ -42,14 +42,14 @@ class Drawn(NamedTuple):
 
 
 def envelope(values: Array, bins: int = BINS) -> NDArray[np.int64]:
-    """Return rows that draw a line as all rows would: nothing that sticks out is lost.
+    """Return the rows that draw a line as all rows would, so that no peak is lost.
 
-    Of each of `bins` equal parts these are the rows of the least and of the largest value; further
-    the first and the last row, and both sides of every edge of a gap (NaN).
+    They are the rows of the least and the largest value in each of `bins` equal intervals, the
+    first and the last row, and both sides of every edge of a gap (NaN).
 
     Args:
         values: (N,), N at least 1; NaN where the line has a gap.
-        bins: How many parts; all rows are kept where N is at most twice that.
+        bins: Number of intervals; all rows are kept if N is at most twice that.
     """
     rows = len(values)
     if rows <= 2 * bins:
@@ -57,6 +57,7 @@ def envelope(values: Array, bins: int = BINS) -> NDArray[np.int64]:
 
     gap = np.isnan(values)
     edge = np.flatnonzero(np.diff(gap))
+    # argmin would return the first NaN; an infinity is chosen only if nothing else is there.
     low = np.where(gap, np.inf, values)
     high = np.where(gap, -np.inf, values)
     ends = np.linspace(0, rows, bins + 1).astype(int)
@@ -68,13 +69,13 @@ def envelope(values: Array, bins: int = BINS) -> NDArray[np.int64]:
 
 
 def highest(values: Array, bins: int = BINS) -> NDArray[np.int64]:
-    """Return the row of the largest value of each of `bins` equal parts; all rows if fewer."""
+    """Return the row of the largest value in each of `bins` equal intervals; all rows if fewer."""
     ends = np.linspace(0, len(values), min(bins, len(values)) + 1).astype(int)
     return np.array([a + int(values[a:b].argmax()) for a, b in pairwise(ends)])
 
 
 def line(ax: Axes, time: Array, values: Array, name: str, **more: Any) -> None:
-    """Draw a line over time in a colour of the look; NaN is a gap."""
+    """Draw a line over time in a named colour; NaN is a gap."""
     rows = envelope(values)
     ax.plot(time[rows], values[rows], color=colour(name), **more)
 
@@ -83,8 +84,8 @@ def panels(*shares: float, height: float) -> tuple[Figure, list[Axes]]:
     """Return a figure of panels over one time axis, one below the other.
 
     Args:
-        shares: Of the height, one for each panel.
-        height: [in].
+        shares: Relative height of each panel.
+        height: Height of the figure [in].
     """
     from matplotlib.figure import Figure
 
@@ -100,22 +101,24 @@ def plane(height: float) -> tuple[Figure, Axes]:
     """Return a figure of the leg plane in mm.
 
     Args:
-        height: [in].
+        height: Height of the figure [in].
     """
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(WIDTH, height), layout="constrained")
     ax = figure.add_subplot()
     ax.set(aspect="equal", xlabel="x [mm]", ylabel="z [mm]")
+    # Equal scales by wider limits: the panel keeps its size beside another one.
     ax.set_adjustable("datalim")
     return figure, ax
 
 
 def shade_unmeasured(ax: Axes, run: StoredRun) -> None:
-    """Shade what tracking and load are not measured over: the ramp, and what follows the window."""
+    """Shade the time that tracking and load leave out: before and after the measured window."""
     window = run.scenario.window
     time = run.record["time"]
-    before = [0.0, *time.tolist()]  # a row is the state at the end of its step
+    # A row is the state at the end of its step, so row k begins at the time of row k - 1.
+    before = [0.0, *time.tolist()]
     for start, stop in ((0.0, before[window.start]), (before[window.stop], before[-1])):
         if stop > start:
             ax.axvspan(start, stop, color=colour("wash"), alpha=0.16, lw=0)
@@ -123,7 +126,8 @@ def shade_unmeasured(ax: Axes, run: StoredRun) -> None:
 
 
 def shade_stance(ax: Axes, time: Array, stands: Bools) -> None:
-    """Shade when the foot stands, at the resolution of the picture."""
+    """Shade the time in which the foot stands."""
+    # At the resolution of the picture: a foot that chatters would make a band for every step.
     ends = np.linspace(0, len(time), min(BINS, len(time)) + 1).astype(int)
     down = np.logical_or.reduceat(stands, ends[:-1])
     flips = np.flatnonzero(np.diff(np.concatenate([[False], down, [False]])))
@@ -140,17 +144,18 @@ def shade_stance(ax: Axes, time: Array, stands: Bools) -> None:
 
 
 def length_unit(peak: float) -> tuple[float, str]:
-    """Return factor and unit in which a length [m] has at least a tenth before its decimals."""
+    """Return the first of `LENGTHS` in which a length [m] is at least 0.1, else the last."""
     return next((each for each in LENGTHS if each[0] * peak >= 0.1), LENGTHS[-1])
 
 
 def ceiling(values: Array) -> float:
     """Return the upper end of an axis from 0 that shows all values; 1 if they are all 0."""
+    # Matplotlib warns of an axis whose ends are equal.
     return 1.08 * float(values.max()) or 1.0
 
 
 def time_colours(count: int) -> list[str]:
-    """Return colours of early to late."""
+    """Return colours from early to late."""
     from matplotlib.colors import LinearSegmentedColormap, to_hex
 
     ramp = LinearSegmentedColormap.from_list("time", TIME)

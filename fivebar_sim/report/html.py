@@ -1,4 +1,4 @@
-"""A page's parts: everything that is text is escaped here, and nothing comes from elsewhere."""
+"""The parts of a page. All text is escaped here, and a page loads nothing from elsewhere."""
 
 from __future__ import annotations
 
@@ -58,11 +58,11 @@ tbody th { min-width: 6.5rem; }
 
 
 class Cell(str):
-    """HTML that is already escaped; any other text is escaped where it is put into a page."""
+    """Escaped HTML; any other text is escaped when it is put into a page."""
 
 
 def text(value: object) -> Cell:
-    """Return text as HTML, on one line; what is HTML already stays."""
+    """Return text as HTML on one line; HTML stays as it is."""
     return value if isinstance(value, Cell) else Cell(escape(" ".join(str(value).split())))
 
 
@@ -70,9 +70,10 @@ def page(title: str, parts: Iterable[str]) -> str:
     """Return a whole page.
 
     Args:
-        title: Plain text.
-        parts: HTML of its body, one after the other.
+        title: Title, as plain text.
+        parts: HTML of the body, in order.
     """
+    # The reader's choice of light or dark only sets these; figures use them too.
     light = look.variables(False)
     dark = look.variables(True)
     head = f"""<!DOCTYPE html>
@@ -102,7 +103,7 @@ def section(title: str, *parts: str) -> str:
 
 
 def figures(drawn: Sequence[Drawn]) -> str:
-    """Return figures side by side where there is room; within `look.styled`."""
+    """Return figures, side by side if there is room; call it within `look.styled`."""
     parts = [
         f'<figure id="{one.key}">\n<h3>{text(one.title)}</h3>\n'
         f"{look.svg(one.figure, one.key, one.alt)}\n"
@@ -115,7 +116,7 @@ def figures(drawn: Sequence[Drawn]) -> str:
 def table(caption: str, head: Sequence[object], rows: Iterable[Sequence[object]]) -> str:
     """Return a table; the first cell of a row is its heading, the others are values.
 
-    Where a table is wider than the page it scrolls by itself, also by keyboard.
+    A table wider than the page scrolls separately, also by keyboard.
     """
     top = "".join(f'<th scope="col"{_class(k)}>{text(cell)}</th>' for k, cell in enumerate(head))
     body = "\n".join(
@@ -124,6 +125,7 @@ def table(caption: str, head: Sequence[object], rows: Iterable[Sequence[object]]
         + "</tr>"
         for row in rows
     )
+    # tabindex puts the table in the keyboard's order, which it must be in to scroll.
     return (
         f'<div class="scroll" role="region" tabindex="0" aria-label="{text(caption)}">\n<table>\n'
         f"<caption>{text(caption)}</caption>\n<thead><tr>{top}</tr></thead>\n"
@@ -136,13 +138,15 @@ def _class(column: int) -> str:
 
 
 def judged(ok: bool, more: str = "") -> Cell:
-    """Return "pass" or "FAIL", told apart by word and colour."""
+    """Return "pass" or "FAIL"."""
+    # Both word and colour differ: not everybody sees colours, and paper may have none.
     word, kind = ("pass", "pass") if ok else ("FAIL", "fail")
     return Cell(f'<span class="{kind}">{word}{escape(more)}</span>')
 
 
 def plain(value: object) -> str:
-    """Return a value as people write it: numbers to five digits, lists by commas."""
+    """Return a value for people: numbers with five digits, lists with commas."""
+    # Before the numbers, since a bool is an int too.
     if isinstance(value, bool) or value is None:
         return {True: "yes", False: "no", None: "none"}[value]
     if isinstance(value, float):

@@ -1,4 +1,4 @@
-"""The figures in the leg plane: the foot's path against its target, the leg over its workspace."""
+"""Figures in the leg plane: the foot's path over its target, the leg over its workspace."""
 
 from __future__ import annotations
 
@@ -24,19 +24,19 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 PIECES = 24
-"""Colours along a path."""
+"""Number of colours along a path."""
 
 MOMENTS = 12
-"""How often the leg is drawn."""
+"""Number of poses of the leg."""
 
 CELLS = 81
-"""Of the workspace's survey; a leg with L6 > 0 takes half a second for them, 5 s for the map's."""
+"""Cells of the workspace's survey per side: half a second for a leg with L6 > 0, not 5 s."""
 
 HARDLY = 0.05
-"""A foot that goes less than this part of the leg's size in a period hardly moves."""
+"""A foot that travels less than this part of the leg's size in a period hardly moves."""
 
 BANDS = 4
-"""Shades of the workspace, from its edge to its deepest place."""
+"""Shades of the workspace, from its edge to its deepest point."""
 
 
 def foot_path(run: StoredRun) -> Drawn:
@@ -47,7 +47,8 @@ def foot_path(run: StoredRun) -> Drawn:
     ends = np.linspace(0, len(foot) - 1, PIECES + 1).astype(int)
 
     for k, tint in enumerate(draw.time_colours(PIECES)):
-        width = 3.4 - 2.4 * k / PIECES  # so that a later round does not hide an earlier one
+        # Thinner with time, so that a later round does not hide an earlier one.
+        width = 3.4 - 2.4 * k / PIECES
         ax.plot(*foot[ends[k] : ends[k + 1] + 1].T, color=tint, lw=width)
 
     ax.plot(*foot[0], "o", color=colour("ink"), ms=5, label="start")
@@ -58,15 +59,15 @@ def foot_path(run: StoredRun) -> Drawn:
     return Drawn(
         "foot-path",
         "Foot path",
-        f"The foot's way over its target in the hip frame, {rms} RMS apart; early and wide to "
-        "late and thin from blue to orange.",
+        f"The foot's path over its target in the hip frame, {rms} RMS apart; from blue and wide "
+        "(early) to orange and thin (late).",
         f"The foot's path in the leg plane, coloured by time, over its target; {rms} RMS apart.",
         figure,
     )
 
 
 def _time_bar(figure: Figure, ax: Axes, time: Array) -> None:
-    """Draw which colour is which time, as a row of rectangles below the path."""
+    """Draw the time scale of the colours below the path."""
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import BoundaryNorm, ListedColormap
 
@@ -82,6 +83,8 @@ def _time_bar(figure: Figure, ax: Axes, time: Array) -> None:
         ticks=np.linspace(0.0, float(time[-1]), 5),
         format="%.3g",
     )
+    # Vectors stay sharp at any size, unlike a bitmap; edges of the same colour close the hairlines
+    # that viewers show between the rectangles.
     assert bar.solids is not None
     bar.solids.set_rasterized(False)
     bar.solids.set_edgecolor("face")
@@ -89,7 +92,7 @@ def _time_bar(figure: Figure, ax: Axes, time: Array) -> None:
 
 
 def leg_moments(run: StoredRun) -> Drawn:
-    """Draw the leg at a dozen moments over its workspace."""
+    """Draw the leg in a dozen poses over its workspace."""
     leg = run.scenario.leg
     rows = moments(run)
     figure, ax = draw.plane(4.9)
@@ -115,8 +118,8 @@ def leg_moments(run: StoredRun) -> Drawn:
     return Drawn(
         "leg-moments",
         "The leg over its workspace",
-        f"The leg at {len(rows)} moments from {times[0]:.4g} s to {times[-1]:.4g} s, evenly along "
-        f"the foot's way, the last one bold. Shaded: what the foot reaches in this working mode, "
+        f"The leg in {len(rows)} poses from {times[0]:.4g} s to {times[-1]:.4g} s, evenly along "
+        f"the foot's path, the last one bold. Shaded: what the foot reaches in this working mode, "
         f"a shade deeper every {1e3 * deepest / BANDS:.3g} mm from the edge; violet: B, C and D in "
         "line.",
         f"The leg {run.scenario.leg.name} in {len(rows)} poses along its foot path, over the "
@@ -126,13 +129,14 @@ def leg_moments(run: StoredRun) -> Drawn:
 
 
 def _workspace(ax: Axes, run: StoredRun) -> float:
-    """Draw what the foot reaches and where it is singular; return the depth of its middle [m]."""
+    """Draw the workspace and its singular curves; return its greatest depth [m]."""
     leg = run.scenario.leg
     surveyed = survey(leg, CELLS)
     deepest = float(surveyed.distance.max())
     x = 1e3 * surveyed.x
     z = 1e3 * surveyed.z
 
+    # Each level shades all that lies deeper, so the shades add up towards the middle.
     for level in np.arange(BANDS) * deepest / BANDS:
         shade = {"levels": [level, np.inf], "colors": [colour("wash")], "alpha": 0.11}
         ax.contourf(x, z, surveyed.distance, **shade)
@@ -147,10 +151,10 @@ def _workspace(ax: Axes, run: StoredRun) -> float:
 
 
 def moments(run: StoredRun) -> NDArray[np.int64]:
-    """Return the rows in which the leg is drawn: evenly along the foot's way, in order.
+    """Return the rows in which the leg is drawn: evenly along the foot's path, in order.
 
-    The way is that of the first measured period, or of the whole run where there is no period or
-    the foot hardly moves in it.
+    The path is that of the first measured period, or of the whole run if there is no period or the
+    foot hardly moves in it.
     """
     window = run.scenario.window
     period = run.scenario.path.period
@@ -164,4 +168,5 @@ def moments(run: StoredRun) -> NDArray[np.int64]:
         if way[stop] - way[window.start] > HARDLY * run.scenario.leg.size:
             first = window.start
             last = stop
+    # Fewer rows than MOMENTS remain where the foot jumps past several marks in one step.
     return np.unique(np.searchsorted(way, np.linspace(way[first], way[last], MOMENTS)))

@@ -1,7 +1,7 @@
-"""How figures look: colours for light and dark, SVG that belongs into a page, PNG for elsewhere.
+"""The look of figures: colours for light and dark, SVG for the page, PNG for other uses.
 
-A figure is drawn in the light colours. In the page each of them becomes a CSS variable, which the
-reader's choice of light or dark sets; so no light colour may stand for two things.
+A figure is drawn in the light colours. In the page each of them becomes a CSS variable, which
+follows the reader's choice of light or dark; so each light colour may have only one name.
 """
 
 from __future__ import annotations
@@ -37,21 +37,24 @@ COLOURS = {
     "run-7": ("#b02a37", "#ff8088"),
     "run-8": ("#4a5560", "#aab4be"),
 }
-"""What a line may be, in light and in dark; each stands out from the page."""
+"""Colours of lines, in light and in dark; each contrasts with the page."""
 
 SOFT = {"grid": ("#dde1e6", "#31373f"), "wash": ("#7d8794", "#8b95a3")}
-"""What lies behind the lines."""
+"""Colours of what lies behind the lines."""
 
 TIME = ("#2f7fd0", "#9a66c4", "#c8589a", "#d0702a")
-"""Early to late, through colours that stand out from light and dark paper alike."""
+"""From early to late; all of them contrast with light and with dark pages."""
 
 WIDTH = 5.4
-"""Of a figure [in]: its letters keep their size on a phone."""
+"""Width of a figure [in]: small enough that its text stays readable on a phone."""
 
 RC: dict[Any, Any] = {
+    # Text stays text: it can be searched, read aloud and copied.
     "svg.fonttype": "none",
+    # Matplotlib's ids are random otherwise, and the same run would not give the same bytes.
     "svg.hashsalt": "fivebar",
-    "text.parse_math": False,  # a name with two $ is a name
+    # A name with two $ is not a formula.
+    "text.parse_math": False,
     "font.size": 10.0,
     "axes.titlesize": 10.0,
     "axes.spines.top": False,
@@ -70,51 +73,54 @@ RC: dict[Any, Any] = {
 
 
 def colour(name: str) -> str:
-    """Return the light colour of a name, in which figures are drawn."""
+    """Return the light colour with a name; figures are drawn in it."""
     return (COLOURS | SOFT)[name][0]
 
 
 def variables(dark: bool) -> str:
-    """Return the CSS variables of all colours."""
+    """Return the CSS variables of all colours, light or dark."""
     pairs = {"paper": PAPER, **COLOURS, **SOFT}
     return " ".join(f"--{name}: {pair[dark]};" for name, pair in pairs.items())
 
 
 @contextmanager
 def styled() -> Iterator[None]:
-    """Draw and save figures in the project's look within, whatever the user's matplotlibrc says."""
+    """Within, figures have the project's look, whatever the user's matplotlibrc says."""
     import matplotlib
 
     with matplotlib.rc_context(), warnings.catch_warnings():
         matplotlib.rcdefaults()
         matplotlib.rcParams.update(RC)
-        # a name may have letters that the font lacks: the browser has others
+        # The browser has other fonts for the letters that Matplotlib's lacks.
         warnings.filterwarnings("ignore", message="Glyph .* missing from font")
         yield
 
 
 def png(figure: Figure) -> bytes:
-    """Return a figure as PNG on white; within `styled`."""
+    """Return a figure as PNG on white; call it within `styled`."""
     out = io.BytesIO()
     figure.savefig(out, format="png", dpi=200, facecolor="white")
     return out.getvalue()
 
 
 def svg(figure: Figure, key: str, alt: str) -> str:
-    """Return a figure as an element of a page, in CSS colours; within `styled`.
+    """Return a figure as an SVG element in CSS colours; call it within `styled`.
 
     Args:
-        figure: Drawn in the light colours.
-        key: Of the figure in its page: its ids start with it.
-        alt: What the figure shows, for who cannot see it.
+        figure: The figure, drawn in the light colours.
+        key: Key of the figure; its ids start with it.
+        alt: What the figure shows, for readers who cannot see it.
     """
     out = io.StringIO()
+    # No date and no version of Matplotlib: the same run must give the same bytes.
     figure.savefig(out, format="svg", transparent=True, metadata={"Date": None})
     text = re.sub(r"<metadata>.*?</metadata>", "", out.getvalue(), flags=re.DOTALL)
     box = re.search(r'viewBox="([^"]*)"', text)
     assert box is not None
+    # Without its size in points the element scales with the page.
     inside = text[text.index(">", text.index("<svg")) + 1 :]
     inside = re.sub(r"<!--.*?-->", "", inside, flags=re.DOTALL).replace("xlink:href", "href")
+    # Ids must be unique in a page, and every figure of Matplotlib uses the same ones.
     inside = _own_ids(inside, key)
     inside = re.sub(r' d="[^"]*"', lambda found: _rounded(found[0]), inside)
     inside = re.sub(r"#[0-9a-f]{6}\b", lambda found: _VARIABLES.get(found[0], found[0]), inside)
@@ -124,18 +130,18 @@ def svg(figure: Figure, key: str, alt: str) -> str:
 
 
 def _own_ids(text: str, key: str) -> str:
-    """Return SVG with the ids that something refers to, told apart by the figure's key."""
+    """Return SVG that keeps only the ids in use, each with the figure's key in front."""
     used = set(re.findall(r'(?:url\(#|href="#)([^")]+)', text))
 
-    def renamed(found: re.Match[str]) -> str:
+    def rename(found: re.Match[str]) -> str:
         return f' id="{key}-{found[1]}"' if found[1] in used else ""
 
-    text = re.sub(r' id="([^"]*)"', renamed, text)
+    text = re.sub(r' id="([^"]*)"', rename, text)
     return re.sub(r'(url\(#|href="#)', rf"\g<1>{key}-", text)
 
 
 def _rounded(path: str) -> str:
-    """Return path data with coordinates to a hundredth of a point."""
+    """Return path data with coordinates rounded to a hundredth of a point."""
     return re.sub(r"-?\d+\.\d{3,}", lambda found: f"{float(found[0]):.2f}", path)
 
 

@@ -1,4 +1,4 @@
-"""What a page says in numbers beyond the metrics."""
+"""Numbers on a page besides the metrics."""
 
 from __future__ import annotations
 
@@ -18,17 +18,18 @@ from fivebar_sim.recording.plots import SHARE_WINDOW, load_share
 from fivebar_sim.runs.stored import StoredRun
 
 PERCENTILE = 95.0
-"""Of the tracking error, beside its RMS."""
+"""Percentile of the tracking error that is shown beside its RMS."""
 
 
 def name_of(run: StoredRun) -> str:
-    """Return the name of a run's directory, in letters that can be written anywhere."""
-    name = os.path.basename(os.path.realpath(run.path))  # Path.resolve raises on a loop of links
+    """Return the name of a run's directory, with printable characters only."""
+    # Path.resolve raises on a loop of links.
+    name = os.path.basename(os.path.realpath(run.path))
     return "".join(letter if letter.isprintable() else "?" for letter in name)
 
 
 def keys(run: StoredRun) -> list[str]:
-    """Return the metrics that a run of its scene has, in the order in which people read them."""
+    """Return the keys of the metrics that a run has in its scene, in reading order."""
     grounded = "ground_z" in run.record
     return [key for key in SHOWN if grounded or key not in GROUND_KEYS]
 
@@ -55,14 +56,14 @@ def share(run: StoredRun) -> Array:
 
 
 def torque_band(run: StoredRun, motor: str) -> tuple[Array, Array] | None:
-    """Return the least and the largest torque that a motor can have at its rate [N m], (N,) each.
+    """Return the least and the largest torque of a motor at its rate [N m], (N,) each.
 
-    With the servo's limit and what it loses with the rate v (see `servo.Servo`):
+    With the servo's limit and its damping c at the rate v (see `servo.Servo`):
 
         -limit - c v,   limit - c v
 
-    MuJoCo decides at the start of a step what the limit clips, so a step may end a little beyond.
-    None is for a servo without a limit.
+    MuJoCo clips by the state at the start of a step, so a step may end a little beyond. Returns
+    None for a servo without a limit.
     """
     servo = run.scenario.servo
     controller = run.scenario.controller

@@ -1,4 +1,4 @@
-"""The figures over time: tracking error, torques, load share, loop gap, ground."""
+"""Figures over time: tracking error, torques, load share, loop gap, ground."""
 
 from __future__ import annotations
 
@@ -20,21 +20,21 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 IN_VIEW = 3.0
-"""A torque limit is in the picture of torques if it is at most so many times the largest."""
+"""A torque limit is drawn if it is at most this many times the largest torque."""
 
 
 def tracking_error(run: StoredRun) -> Drawn:
-    """Draw the foot's distance from its target, its RMS and what 95 % of it stay below."""
+    """Draw the tracking error with its RMS and 95th percentile."""
     error = tracking.tracking_error(run.record)
     most = numbers.percentile(run)
     rms = look_up(run.metrics, "tracking.rms") or 0.0
     scale, unit = draw.length_unit(float(error.max()))
     figure, (ax,) = draw.panels(1, height=2.9)
     draw.line(ax, run.record["time"], scale * error, "error")
-    said = {"RMS": shown("tracking.rms", rms), "95 %": shown("tracking.rms", most)}
+    levels = {"RMS": shown("tracking.rms", rms), "95 %": shown("tracking.rms", most)}
 
     for value, style, name in ((rms, "--", "RMS"), (most, ":", "95 %")):
-        label = f"{name}: {said[name]}"
+        label = f"{name}: {levels[name]}"
         ax.axhline(scale * value, color=colour("ink"), ls=style, lw=1.4, label=label)
 
     draw.shade_unmeasured(ax, run)
@@ -44,10 +44,10 @@ def tracking_error(run: StoredRun) -> Drawn:
     return Drawn(
         "tracking-error",
         "Tracking error",
-        "How far the foot is from its target. Shaded: not measured (the ramp from rest, and what "
-        "follows the last whole period).",
-        f"Line of the tracking error over time; RMS {said['RMS']}, 95 % of the steps below "
-        f"{said['95 %']}.",
+        "Distance of the foot from its target. Shaded: not measured (the ramp from rest, and the "
+        "time after the last whole period).",
+        f"Line of the tracking error over time; RMS {levels['RMS']}, 95 % of the steps below "
+        f"{levels['95 %']}.",
         figure,
     )
 
@@ -55,17 +55,18 @@ def tracking_error(run: StoredRun) -> Drawn:
 def torque(run: StoredRun) -> Drawn:
     """Draw the torques of A and E with RMS, peak, share, and the servo's limit."""
     figure, axes = draw.panels(1, 1, height=4.6)
+    # One scale for both motors, or an idle one would look as busy as the other.
     largest = max(float(np.abs(run.record[f"torque_{motor}"]).max()) for motor in "AE")
     for ax, motor in zip(axes, "AE", strict=True):
         _torque(ax, run, motor, largest)
 
     share = look_up(run.metrics, "load.share_A")
     limit = run.scenario.servo.limit
-    said = ""
+    note = ""
     if limit is not None:
         inside = limit <= IN_VIEW * largest
-        said = f" The servo's limit is {shown('load.torque_peak.A', limit)} at rest" + (
-            ": dash-dotted, at the rate of each moment." if inside else ", out of the picture."
+        note = f" The servo's limit is {shown('load.torque_peak.A', limit)} at rest" + (
+            ": dash-dotted, for the rate at each time." if inside else ", outside the picture."
         )
 
     rms, peak = (
@@ -78,7 +79,7 @@ def torque(run: StoredRun) -> Drawn:
     return Drawn(
         "torque",
         "Motor torques",
-        f"What the motors at A and E applied; dashed: RMS to both sides; ring: the peak.{said}",
+        f"What the motors at A and E applied; dashed: plus and minus RMS; ring: the peak.{note}",
         f"Lines of the torques of A and E over time; RMS {rms}, peak {peak}, share of A "
         f"{shown('load.share_A', share)}.",
         figure,
@@ -86,7 +87,7 @@ def torque(run: StoredRun) -> Drawn:
 
 
 def _torque(ax: Axes, run: StoredRun, motor: str, largest: float) -> None:
-    """Draw the torque of one motor; both have one scale."""
+    """Draw the torque of one motor; `largest` [N m] sets the scale."""
     time = run.record["time"]
     tau = 1e3 * run.record[f"torque_{motor}"]
     window = run.scenario.window
@@ -98,6 +99,7 @@ def _torque(ax: Axes, run: StoredRun, motor: str, largest: float) -> None:
     for side in (-1.0, 1.0):
         ax.axhline(side * 1e3 * (rms or 0.0), color=colour("ink"), ls="--", lw=1.0)
 
+    # The metrics count the window only, so the ring must not mark a peak of the ramp.
     top = window.start + int(np.abs(tau[window]).argmax())
     ax.plot(time[top], tau[top], "o", mfc="none", mec=colour("ink"), ms=8, mew=1.4)
     room = 1.15e3 * largest or 1.0
@@ -110,21 +112,21 @@ def _torque(ax: Axes, run: StoredRun, motor: str, largest: float) -> None:
             room = max(room, 1.05e3 * float(np.abs(edge).max()))
 
     draw.shade_unmeasured(ax, run)
-    said = f"RMS {shown('load.torque_rms.A', rms)}, peak {shown('load.torque_peak.A', peak)}"
+    levels = f"RMS {shown('load.torque_rms.A', rms)}, peak {shown('load.torque_peak.A', peak)}"
     ax.set(ylabel=f"torque {motor} [mN m]", ylim=(-room, room))
-    ax.set_title(f"{motor}: {said}, share {shown('load.share_A', part)}", loc="left")
+    ax.set_title(f"{motor}: {levels}, share {shown('load.share_A', part)}", loc="left")
 
 
 def load_share(run: StoredRun) -> Drawn:
     """Draw A's share of the load in a moving window."""
     whole = look_up(run.metrics, "load.share_A")
-    said = shown("load.share_A", whole)
+    average = shown("load.share_A", whole)
     figure, (ax,) = draw.panels(1, height=2.6)
     draw.line(ax, run.record["time"], 100.0 * numbers.share(run), "A", lw=1.6)
     ax.axhline(50.0, color=colour("muted"), lw=1.0)
 
     if whole is not None:
-        label = f"over all that is measured: {said}"
+        label = f"over the measured time: {average}"
         ax.axhline(100.0 * whole, color=colour("ink"), ls="--", lw=1.2, label=label)
         figure.legend(loc="outside upper center")
 
@@ -133,15 +135,15 @@ def load_share(run: StoredRun) -> Drawn:
     return Drawn(
         "load-share",
         "Load share",
-        f"A's part of the torque impulse within {1e3 * SHARE_WINDOW:g} ms; 50 % is evenly shared. "
+        f"A's part of the torque impulse within {1e3 * SHARE_WINDOW:g} ms; 50 % is an even share. "
         "There is no line where neither motor has a torque.",
-        f"Line of A's share of the load over time; {said} over all that is measured.",
+        f"Line of A's share of the load over time; {average} over the measured time.",
         figure,
     )
 
 
 def loop_gap(run: StoredRun) -> Drawn:
-    """Draw how far the loop is open at C."""
+    """Draw the loop's gap at C."""
     gap = run.record["gap"]
     rms, most = (shown(key, look_up(run.metrics, key)) for key in ("closure.rms", "closure.max"))
     scale, unit = draw.length_unit(float(gap.max()))
@@ -153,7 +155,7 @@ def loop_gap(run: StoredRun) -> Drawn:
     return Drawn(
         "loop-gap",
         "Loop gap",
-        f"How far the ends of L2 and L3 are apart at C, where the simulation closes the loop: "
+        f"Distance between the ends of L2 and L3 at C, where the simulation closes the loop: "
         f"{rms} RMS, {most} at most, over the whole run.",
         f"Line of the loop gap over time; RMS {rms}, largest {most}.",
         figure,
@@ -161,7 +163,7 @@ def loop_gap(run: StoredRun) -> Drawn:
 
 
 def ground_contact(run: StoredRun) -> Drawn | None:
-    """Draw the ground's force, the foot's height and when it stands; None without a ground."""
+    """Draw the ground's force, the foot's height and the stance; None without a ground."""
     if "ground_z" not in run.record:
         return None
 

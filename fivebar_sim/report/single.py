@@ -1,4 +1,4 @@
-"""The page of one run: verdict, limits, figures, all metrics, what was run and how to again."""
+"""The page of one run: verdict, limits, figures, all metrics, the scenario and its command."""
 
 from __future__ import annotations
 
@@ -18,9 +18,10 @@ from fivebar_sim.runs.stored import StoredRun
 
 
 def figures(run: StoredRun) -> list[Drawn]:
-    """Return the figures of a run; within `look.styled`."""
+    """Return the figures of a run; call it within `look.styled`."""
     drawn = [
-        in_plane.foot_path(run),  # side by side on a desk: two of a height
+        # On a wide screen two figures stand side by side, so neighbours are of similar height.
+        in_plane.foot_path(run),
         in_plane.leg_moments(run),
         over_time.tracking_error(run),
         over_time.load_share(run),
@@ -32,7 +33,7 @@ def figures(run: StoredRun) -> list[Drawn]:
 
 
 def page(run: StoredRun, drawn: list[Drawn]) -> str:
-    """Return the page of a run with its figures; within `look.styled`."""
+    """Return the page of a run with its figures; call it within `look.styled`."""
     scenario = run.scenario
     parts = [
         _head(run),
@@ -46,7 +47,7 @@ def page(run: StoredRun, drawn: list[Drawn]) -> str:
 
 
 def _head(run: StoredRun) -> str:
-    """Return name, verdict and a sentence about the run."""
+    """Return the heading: name, verdict, and a sentence about the run."""
     scenario = run.scenario
     metrics = run.metrics
     window = scenario.window
@@ -59,7 +60,7 @@ def _head(run: StoredRun) -> str:
         f"Tracking and load are measured from {window.start * h:.4g} s to {window.stop * h:.4g} s, "
         f"the loop gap over the whole run."
     )
-    tripped = [f'<p class="fail">{text(said)}</p>' for said in guards.tripped(metrics["guards"])]
+    tripped = [f'<p class="fail">{text(line)}</p>' for line in guards.tripped(metrics["guards"])]
     word = "pass" if good else "fail"
 
     return "\n".join(
@@ -73,7 +74,7 @@ def _head(run: StoredRun) -> str:
 
 
 def _limits(run: StoredRun) -> str:
-    """Return every limit and guard, the value, and whether it holds."""
+    """Return the table of limits and guards: bound, value, and whether it holds."""
     rows = [
         (SHOWN[limit.key][0], bounds(limit), shown(limit.key, limit.value), html.judged(limit.ok))
         for limit in numbers.limits(run)
@@ -89,7 +90,7 @@ def _limits(run: StoredRun) -> str:
 
 
 def _load(run: StoredRun) -> str:
-    """Return what either motor did, and how they worked against each other."""
+    """Return the table of both motors' load, and how much they opposed each other."""
     named = {
         "load.torque_rms": "torque RMS",
         "load.torque_peak": "torque peak",
@@ -126,7 +127,7 @@ def _load(run: StoredRun) -> str:
 
 
 def _phase(run: StoredRun) -> list[str]:
-    """Return the load over the gait's cycle, if the path has one."""
+    """Return the table of the load over the gait's cycle, if the path has one."""
     phase = run.metrics["load"].get("phase")
     if phase is None:
         return []
@@ -148,11 +149,13 @@ def _phase(run: StoredRun) -> list[str]:
 
 
 def _metrics(run: StoredRun) -> str:
-    """Return every metric, as people read it and as metrics.json has it."""
+    """Return the table of every metric: for people, and as in metrics.json."""
     rows = []
     for key, value in numbers.flat_metrics(run).items():
+        # The load over the cycle has its own table.
         if key.startswith("load.phase."):
-            continue  # a table of its own
+            continue
+        # Metrics in stance have the units and words of their namesakes over all steps.
         alike = key.replace("load.stance.", "load.")
         label = key.rpartition(".")[2].replace("_", " ")
         read = plain(value)
@@ -168,13 +171,14 @@ def _metrics(run: StoredRun) -> str:
 
 
 def _what(run: StoredRun) -> list[str]:
-    """Return the resolved scenario, what the numbers depend on, and the command."""
+    """Return the command, the provenance of the numbers, and the resolved scenario."""
+    # Quoted for a shell: a run directory may have blanks in its name.
     again = shlex.join(["fivebar", "run", f"{numbers.name_of(run)}/scenario.toml"])
     rows = [(key, plain(value)) for key, value in tables.flat(run.metrics["provenance"])]
     return [
-        "<p>To run it again, from the folder that the run directory is in:</p>",
+        "<p>To run it again, in the folder that contains the run directory:</p>",
         f"<pre><code>{html.escape(again)}</code></pre>",
         html.table("Where the numbers come from.", ("", ""), rows),
-        "<p>The scenario with every default spelt out, scenario.toml:</p>",
+        "<p>The scenario with all defaults, scenario.toml:</p>",
         f'<pre tabindex="0"><code>{html.escape(tomli_w.dumps(run.scenario.table()))}</code></pre>',
     ]

@@ -1,4 +1,4 @@
-"""The workspace as a picture: distance to its boundary, singular curves, a foot path."""
+"""A picture of the workspace: distance to its boundary, singular curves, a foot path."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ FORMATS = (".png", ".svg", ".pdf")
 
 
 def write(leg: FiveBar, out: Path, path: Array | None = None) -> Map:
-    """Draw the map of a leg into a picture, written beside and renamed; return the map.
+    """Draw the workspace of a leg into a picture; return its map.
 
     Args:
         leg: The leg.
         out: The file; .png, .svg or .pdf.
-        path: A foot path to draw on it [m], hip frame, (n, 2).
+        path: A foot path to draw over it [m], hip frame, (n, 2).
 
     Raises:
         ConfigError: An unknown kind of picture, or a file that cannot be written.
@@ -44,7 +44,7 @@ def write(leg: FiveBar, out: Path, path: Array | None = None) -> Map:
 
 
 def _draw(ax: Axes, leg: FiveBar, surveyed: Map, path: Array | None) -> None:
-    """Draw a map in mm."""
+    """Draw a workspace's map in mm."""
     x = 1e3 * surveyed.x
     z = 1e3 * surveyed.z
     distance = 1e3 * surveyed.distance
@@ -57,11 +57,13 @@ def _draw(ax: Axes, leg: FiveBar, surveyed: Map, path: Array | None) -> None:
         (workspace.singular_curves(leg), "crimson", "singular: B, C, D in line"),
     ):
         for k, curve in enumerate(curves):
+            # One entry in the legend for all curves of a kind.
             ax.plot(*(1e3 * curve).T, color=colour, lw=1.3, label=label if k == 0 else None)
 
     rest = kinematics.chain_points(leg, kinematics.home(leg))
     A, E = kinematics.bases(leg)
     for chain in ((A, rest.B, rest.C_left, rest.F), (E, rest.D, rest.C_right)):
+        # A wide white line under a thin grey one stands out from light and dark cells alike.
         ax.plot(*(1e3 * np.array(chain)).T, "o-", color="white", mec="black", lw=3, ms=5)
         ax.plot(*(1e3 * np.array(chain)).T, "-", color="0.25", lw=1.2)
 

@@ -1,4 +1,4 @@
-"""From run directories to files: where a report lies, what it refuses, and how it gets there."""
+"""Write reports: read the run directories, draw, and write the page and its pictures."""
 
 from __future__ import annotations
 
@@ -13,25 +13,24 @@ from fivebar_sim.runs import stored
 
 
 def place_of(runs: Sequence[Path]) -> Path:
-    """Return where a report lies by default: in its run directory, or here that of several."""
+    """Return the default place: RUN_DIR/report.html, or comparison.html here for several runs."""
     return runs[0] / "report.html" if len(runs) == 1 else Path("comparison.html")
 
 
 def write(runs: Sequence[Path], out: Path | None = None, png: Path | None = None) -> list[Path]:
     """Write the report of one run, or the comparison of several; return the files, the page last.
 
-    The same runs give the same bytes. Every file is written beside its place, then renamed; an
-    older one of its name is replaced.
+    The same runs give the same bytes. Every file is written atomically and replaces an older one.
 
     Args:
         runs: Run directories, at least one.
-        out: The page, .html; None is `place_of`.
-        png: A folder for the figures as single pictures; None is nowhere.
+        out: The page, .html; None: `place_of`.
+        png: Folder for the figures as separate pictures; None: no pictures.
 
     Raises:
-        RunDirectoryError: No complete run directory, a damaged one, or a place that cannot be
+        RunDirectoryError: A run directory is missing, incomplete or damaged, or a file cannot be
             written.
-        ArgumentError: No run, one of them twice, or more than can be told apart.
+        ArgumentError: No run, the same run twice, or more runs than `comparison.MOST`.
     """
     _check_runs(runs)
     place = place_of(runs) if out is None else out
@@ -41,6 +40,7 @@ def write(runs: Sequence[Path], out: Path | None = None, png: Path | None = None
         raise RunDirectoryError(f"cannot write {place}: a directory is there")
 
     read = [stored.read(path) for path in runs]
+    # All content is ready before the first file is written; the page comes last.
     files: dict[Path, bytes] = {}
     with look.styled():
         drawn = single.figures(read[0]) if len(read) == 1 else comparison.figures(read)
@@ -55,11 +55,12 @@ def write(runs: Sequence[Path], out: Path | None = None, png: Path | None = None
 
 
 def _check_runs(runs: Sequence[Path]) -> None:
-    """Raise unless there is a run, none twice, and not too many."""
+    """Raise unless there is a run, none is given twice, and there are not too many."""
     if not 1 <= len(runs) <= comparison.MOST:
-        raise ArgumentError(f"a report is of 1 to {comparison.MOST} runs, got {len(runs)}")
+        raise ArgumentError(f"a report needs 1 to {comparison.MOST} runs, got {len(runs)}")
     seen: set[str] = set()
     for run in runs:
+        # Two paths may lead to one directory, through links or "..".
         place = os.path.realpath(run)
         if place in seen:
             raise ArgumentError(f"the run {run} is given twice")
