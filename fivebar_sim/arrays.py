@@ -59,7 +59,7 @@ def finite(values: Array, name: str) -> Array:
     return values
 
 
-def together(**arrays: Array) -> list[Array]:
+def broadcast(**arrays: Array) -> list[Array]:
     """Return the arrays broadcast to one shape.
 
     Raises:

@@ -112,7 +112,7 @@ class LegEnv(gymnasium.Env[Array, Array]):
         """Return a picture of the leg, (480, 640, 3); None without a render mode.
 
         Raises:
-            ConfigError: There is no GL here.
+            ConfigError: There is no working GL.
         """
         if self.render_mode is None:
             return None

@@ -119,7 +119,7 @@ def _draw(result: Result, place: Path) -> list[str]:
 
     run = StoredRun(place, result.scenario, result.record, result.metrics)
     names = []
-    with look.styled():
+    with look.project_style():
         for drawn in (in_plane.foot_path(run), over_time.tracking_error(run)):
             names.append(f"{drawn.key}.png")
             (place / names[-1]).write_bytes(look.png(drawn.figure))

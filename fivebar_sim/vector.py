@@ -91,7 +91,7 @@ class LegVectorEnv(VectorEnv[Array, Array, Any]):
         elif isinstance(seed, Sequence):
             seeds = list(seed)
         else:
-            # Called for its error: adding i to something that is no number raises another one.
+            # Called for its error: adding i to what is not a number raises another one.
             seeding.np_random(seed)
             seeds = [seed + i for i in range(self.num_envs)]
 

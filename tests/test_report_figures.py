@@ -65,7 +65,7 @@ def test_a_limit_is_drawn_where_it_is_near(
 ) -> None:
     scenario = ellipse.scenario
     limited = replace(scenario, servo=replace(scenario.servo, limit=limit))
-    with look.styled():
+    with look.project_style():
         drawn = over_time.torque(ellipse._replace(scenario=limited))
     assert said in drawn.caption
     assert ("limit" in drawn.caption) == bool(said)
@@ -77,7 +77,7 @@ def test_figures_show_the_record(ellipse: StoredRun) -> None:
     record = ellipse.record
     window = ellipse.scenario.window
     error = np.hypot(record["foot_x"] - record["target_x"], record["foot_z"] - record["target_z"])
-    with look.styled():
+    with look.project_style():
         path, tracking, torque = (
             draw(ellipse).figure.axes
             for draw in (in_plane.foot_path, over_time.tracking_error, over_time.torque)
@@ -125,7 +125,7 @@ def test_moments_are_evenly_along_the_way(ellipse: StoredRun, landing: StoredRun
 
 
 def test_ground_is_drawn_only_where_there_is_one(ellipse: StoredRun, landing: StoredRun) -> None:
-    with look.styled():
+    with look.project_style():
         assert over_time.ground_contact(ellipse) is None
         drawn = over_time.ground_contact(landing)
     assert drawn is not None
@@ -165,7 +165,7 @@ def test_difference(
 
 def test_overlaid_gaps_are_on_a_scale_by_powers(ellipse: StoredRun, landing: StoredRun) -> None:
     runs = [ellipse, landing._replace(path=Path("_two")), ellipse._replace(path=Path("three"))]
-    with look.styled():
+    with look.project_style():
         drawn = {one.key: one.figure for one in comparison.figures(runs)}
     ax = drawn["loop-gap"].axes[0]
     assert ax.get_yscale() == "log"

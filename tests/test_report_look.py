@@ -84,7 +84,7 @@ def test_a_light_colour_stands_for_one_thing() -> None:
 def test_svg_of_two_figures_in_one_page() -> None:
     found = []
     for key in ("one", "two"):
-        with look.styled():
+        with look.project_style():
             figure, (ax,) = draw.panels(1, height=2.0)
             draw.line(ax, np.arange(9.0), np.array([*range(8), 1e-7]), "A", label="_$x$ <&>")
             found.append(look.svg(figure, key, 'a "line"'))
@@ -104,7 +104,7 @@ def test_shading_of_stance_is_where_the_foot_stands() -> None:
     time = np.arange(1.0, 6001.0)
     down = np.zeros(6000, dtype=bool)
     down[1000:2000] = down[5999] = True
-    with look.styled():
+    with look.project_style():
         _, (ax,) = draw.panels(1, height=2.0)
         draw.shade_stance(ax, time, down)
     spans = [path.get_extents().intervalx for path in ax.collections[0].get_paths()]

@@ -8,7 +8,7 @@ import msgspec
 import numpy as np
 
 from fivebar_sim import kinematics
-from fivebar_sim.arrays import Array, together
+from fivebar_sim.arrays import Array, broadcast
 from fivebar_sim.checks import check_number
 from fivebar_sim.control import Observation, Reference
 from fivebar_sim.control.interface import Drive
@@ -85,7 +85,7 @@ def distance(leg: FiveBar, theta: Array, foot: Array) -> Array:
     Returns:
         [m], (...).
     """
-    theta, foot = together(theta=theta, foot=foot)
+    theta, foot = broadcast(theta=theta, foot=foot)
     try:
         d = kinematics.forward(leg, theta) - foot
     except LoopOpenError:

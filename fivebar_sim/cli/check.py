@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from tyro.conf import arg
 
-from fivebar_sim.cli.common import Scenarios, Settings, plans_of, screen, working
+from fivebar_sim.cli.common import Scenarios, Settings, plans_of, screen, spinner
 from fivebar_sim.cli.status import FAILED, WRONG, say
 from fivebar_sim.errors import ConfigError, DivergedError, RunDirectoryError
 
@@ -57,7 +57,7 @@ def check(
     olds = [baseline.read(place) for place in places]
     _check_places(junit, summary)
 
-    with working(f"checking {len(plans)} scenarios", quiet=quiet):
+    with spinner(f"checking {len(plans)} scenarios", quiet=quiet):
         results = _results(plans)
 
     checked = [_judge(*each) for each in zip(plans, results, olds, strict=True)]

@@ -62,7 +62,7 @@ def screen(*, stderr: bool = False, quiet: bool = False):
     return Screen(file=stream, quiet=quiet, emoji=False)
 
 
-def working(what: str, *, quiet: bool):
+def spinner(what: str, *, quiet: bool):
     """Return a context that shows a spinner on a terminal's stderr."""
     from rich.text import Text
 

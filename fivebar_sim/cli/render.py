@@ -7,7 +7,7 @@ from typing import Annotated
 
 from tyro.conf import Positional, arg
 
-from fivebar_sim.cli.common import working
+from fivebar_sim.cli.common import spinner
 
 
 def render(
@@ -47,7 +47,7 @@ def render(
 
     place = Path(f"{run.scenario.name}.gif" if out is None else out)
     film = render.Film(width, height, fps, speed, at)
-    with working(f"drawing {place}", quiet=False):
+    with spinner(f"drawing {place}", quiet=False):
         frames = render.write(replay(run.scenario, run.record), place, film)
 
     size = place.stat().st_size / 1e3

@@ -7,7 +7,7 @@ from typing import Annotated
 
 from tyro.conf import Positional, arg
 
-from fivebar_sim.cli.common import working
+from fivebar_sim.cli.common import spinner
 
 
 def report(
@@ -29,7 +29,7 @@ def report(
     """
     from fivebar_sim import report as reports
 
-    with working("drawing", quiet=quiet):
+    with spinner("drawing", quiet=quiet):
         *pictures, page = reports.write(run_dirs, out, png)
     if not quiet:
         more = f", {len(pictures)} figures in {png}" if pictures else ""

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from tyro.conf import arg
 
-from fivebar_sim.cli.common import Scenarios, Settings, plans_of, screen, working
+from fivebar_sim.cli.common import Scenarios, Settings, plans_of, screen, spinner
 from fivebar_sim.cli.status import FAILED, say
 from fivebar_sim.errors import ConfigError, DivergedError
 
@@ -89,7 +89,7 @@ def _run(
     for planned, place in zip(plans, places, strict=True):
         name = planned.scenario.name
         try:
-            with working(f"simulating {name}", quiet=quiet):
+            with spinner(f"simulating {name}", quiet=quiet):
                 result = _execute(planned, viewer)
                 result.write(place)
         # The other scenarios still run.

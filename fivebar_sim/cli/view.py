@@ -6,7 +6,7 @@ from typing import Annotated
 
 from tyro.conf import Positional, arg
 
-from fivebar_sim.cli.common import working
+from fivebar_sim.cli.common import spinner
 
 
 def view(
@@ -32,7 +32,7 @@ def view(
         view.hold(what)
         return 0
 
-    with working(f"simulating {what.name}", quiet=False):
+    with spinner(f"simulating {what.name}", quiet=False):
         result = rollout.run(what)
 
     view.play(replay(result.scenario, result.record))

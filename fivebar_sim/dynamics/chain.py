@@ -96,7 +96,7 @@ class Chain:
         S2: Moment of mass of L2 about B [kg m].
         S3: Moment of mass of L3 about D [kg m].
         S4: Moment of mass of L4 about E, and of L3's mass at D [kg m].
-        AE: From A to E [m].
+        AE: Vector from A to E [m].
         hung: Moment of mass about O of side A's masses at A and side E's at E, hip frame [kg m].
     """
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from fivebar_sim import kinematics
-from fivebar_sim.arrays import Array, as_pairs, at, finite, first_index, together
+from fivebar_sim.arrays import Array, as_pairs, at, broadcast, finite, first_index
 from fivebar_sim.checks import check_number
 from fivebar_sim.dynamics import motion, stepwise
 from fivebar_sim.dynamics.chain import Chain, Vector, cross, placed
@@ -197,7 +197,7 @@ def _chain(leg: FiveBar, assembly: int | None, payload: float) -> Chain:
 
 def _pairs(**values: ArrayLike) -> list[Array]:
     """Return the values broadcast to finite pairs (..., 2); ArgumentError if they are not."""
-    return together(**{name: finite(as_pairs(v, name), name) for name, v in values.items()})
+    return broadcast(**{name: finite(as_pairs(v, name), name) for name, v in values.items()})
 
 
 def _split(pairs: Array) -> Vector:

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fivebar_sim.arrays import Array, as_pairs, at, finite, first_index, together
+from fivebar_sim.arrays import Array, as_pairs, at, broadcast, finite, first_index
 from fivebar_sim.checks import check_number
 from fivebar_sim.dynamics.chain import Chain, Pose, Vector
 from fivebar_sim.errors import ArgumentError, DivergedError, LoopOpenError, SingularError
@@ -339,7 +339,7 @@ def _diverged(time: float, why: str) -> DivergedError:
 
 def _start(theta: ArrayLike, theta_dot: ArrayLike) -> tuple[Array, Array]:
     """Return the state as finite arrays; ArgumentError if it is not finite."""
-    q, w = together(
+    q, w = broadcast(
         theta=finite(as_pairs(theta, "theta"), "theta"),
         theta_dot=finite(as_pairs(theta_dot, "theta_dot"), "theta_dot"),
     )

@@ -40,7 +40,7 @@ def _check_free(path: Path) -> None:
 
 
 @contextmanager
-def beside(path: Path) -> Iterator[Path]:
+def stage(path: Path) -> Iterator[Path]:
     """Give a temporary path beside a file; it is renamed to the file if no error occurs.
 
     Raises:
@@ -51,14 +51,14 @@ def beside(path: Path) -> Iterator[Path]:
         # Beside the target, on one file system: only there is a rename atomic.
         handle, name = tempfile.mkstemp(prefix=".fivebar-", suffix=path.suffix, dir=path.parent)
         os.close(handle)
-        stage = Path(name)
+        place = Path(name)
         try:
-            yield stage
+            yield place
             # mkstemp makes files that only their owner can read.
-            stage.chmod(0o644)
-            stage.replace(path)
+            place.chmod(0o644)
+            place.replace(path)
         finally:
-            stage.unlink(missing_ok=True)
+            place.unlink(missing_ok=True)
     except OSError as error:
         raise ConfigError(f"cannot write {path}: {error.strerror or error}") from None
 
@@ -74,8 +74,8 @@ def write(path: Path, content: str | bytes) -> None:
         path.parent.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise ConfigError(f"cannot write {path}: {error.strerror or error}") from None
-    with beside(path) as stage:
-        stage.write_bytes(data)
+    with stage(path) as place:
+        place.write_bytes(data)
 
 
 def append(path: Path, text: str) -> None:

@@ -75,7 +75,7 @@ def half_angle(r: Array, near: float, far: float, s: int) -> tuple[Array, Bools]
     """Return the motor angle of one side chain by the half-angle form, and where it reaches.
 
     Args:
-        r: From the motor to the chain's end (X, Y) [m], (..., 2).
+        r: Vector from the motor to the chain's end (X, Y) [m], (..., 2).
         near: Link at the motor [m].
         far: Link beyond the knee [m].
         s: +1 or -1, the side's working mode.

@@ -143,7 +143,7 @@ def leg_plane(hip: Hip, foot: ArrayLike, side: ArrayLike | None = None) -> InPla
         no offset: a ratio loses the quadrant.
     """
     foot = as_vectors(foot, "foot", 3)
-    phi, planar, ok = _turned_back(hip, foot, side)
+    phi, planar, ok = _turn_back(hip, foot, side)
     if not ok.all():
         raise _within_cylinder(hip, foot, ok)
     return InPlane(phi, planar)
@@ -169,7 +169,7 @@ def inverse(
         ArgumentError: Unknown mode or side, or a shape other than (..., 3).
     """
     foot = as_vectors(foot, "foot", 3)
-    phi, planar, ok = _turned_back(hip, foot, side)
+    phi, planar, ok = _turn_back(hip, foot, side)
     try:
         theta = kinematics.inverse(hip.leg, planar, mode)
     except UnreachableError as error:
@@ -211,7 +211,7 @@ def jacobian(hip: Hip, theta3: ArrayLike, assembly: int | None = None) -> Array:
     return np.stack([by_phi, by_A, by_E], axis=-1)
 
 
-def _turned_back(hip: Hip, foot: Array, side: ArrayLike | None) -> tuple[Array, Array, Bools]:
+def _turn_back(hip: Hip, foot: Array, side: ArrayLike | None) -> tuple[Array, Array, Bools]:
     """Return phi (...), the planar foot (..., 2), and where they exist; the foot is NaN elsewhere.
 
     With the axis as z (see `_axis_up`), F = (p, q, .) and O = (., w, .):

@@ -30,7 +30,7 @@ def end_velocity(AB: Array, BF: Array, psi_1_dot: Array, psi_2_dot: Array) -> Ar
 
     Args:
         AB: First link, (..., 2).
-        BF: From the first link's end to F, fixed to the second link, (..., 2).
+        BF: Vector from the first link's end to F, fixed to the second link, (..., 2).
         psi_1_dot: Rate of the first link's direction [rad/s], (...).
         psi_2_dot: Rate of the second link's direction [rad/s], (...).
     """

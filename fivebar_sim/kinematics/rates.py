@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fivebar_sim.arrays import Array, as_pairs, at, finite, first_index, together
+from fivebar_sim.arrays import Array, as_pairs, at, broadcast, finite, first_index
 from fivebar_sim.errors import SingularError
 from fivebar_sim.geometry import FiveBar, Mode
 from fivebar_sim.kinematics.closure import bases, closed_points
@@ -103,7 +103,7 @@ def joint_motion(
         SingularError: A side chain is straight or folded.
         ArgumentError: The shapes do not broadcast, or rates are not finite.
     """
-    F, F_dot, F_ddot = together(
+    F, F_dot, F_ddot = broadcast(
         foot=as_pairs(foot, "foot"),
         foot_dot=finite(as_pairs(foot_dot, "foot_dot"), "foot_dot"),
         foot_ddot=finite(as_pairs(foot_ddot, "foot_ddot"), "foot_ddot"),

@@ -29,7 +29,7 @@ def side_angle(r: Array, near: float, far: float, s: int) -> tuple[Array, Bools]
     fits; it is 0 by convention.
 
     Args:
-        r: From the motor to the chain's end [m], (..., 2).
+        r: Vector from the motor to the chain's end [m], (..., 2).
         near: Link at the motor [m].
         far: Link beyond the knee [m].
         s: +1 or -1, the side's working mode.

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fivebar_sim.arrays import Array, Bools, as_pairs, at, finite, first_index, together
+from fivebar_sim.arrays import Array, Bools, as_pairs, at, broadcast, finite, first_index
 from fivebar_sim.checks import check_number
 from fivebar_sim.errors import ArgumentError, GeometryError, SingularError, UnreachableError
 from fivebar_sim.geometry import LONGEST
@@ -133,7 +133,7 @@ class SerialLeg:
             ArgumentError: Shapes that do not broadcast, or numbers that are not finite.
         """
         AB, BF = self._links(theta)
-        BF, F = together(theta=BF, force=finite(as_pairs(force, "force"), "force"))
+        BF, F = broadcast(theta=BF, force=finite(as_pairs(force, "force"), "force"))
         tau_A = -cross(AB + BF, F)
         tau_B = -cross(BF, F)
         return np.stack([tau_A - tau_B if belt else tau_A, tau_B], axis=-1)
@@ -221,7 +221,7 @@ class CrouchingLeg:
             ArgumentError: Unless -pi/2 <= q1 <= pi/2 and h_dot is finite; shapes that differ.
         """
         v = finite(_numbers(h_dot, "h_dot"), "h_dot")
-        q1, v = together(q1=_hip_angle(q1), h_dot=v)
+        q1, v = broadcast(q1=_hip_angle(q1), h_dot=v)
         stretched = ~(np.abs(np.sin(q1)) > SINGULAR)
         if stretched.any():
             index = first_index(stretched)
@@ -252,7 +252,7 @@ class CrouchingLeg:
             ArgumentError: Unless -pi/2 <= q1 <= pi/2 and the load is finite; shapes that differ.
         """
         W = finite(_numbers(load, "load"), "load")
-        q1, W = together(q1=_hip_angle(q1), load=W)
+        q1, W = broadcast(q1=_hip_angle(q1), load=W)
         tau_2 = W * self.l * np.sin(q1)
         return np.stack([-tau_2 if belt else np.zeros_like(tau_2), tau_2], axis=-1)
 

@@ -123,7 +123,7 @@ def write(replay: Replay, out: Path, film: Film) -> int:
     if kind == ".png":
         times = [0.5 * replay.duration if film.at is None else film.at]
 
-    with whole_file.beside(out) as place, stage(replay, film.width, film.height) as drawn:
+    with whole_file.stage(out) as place, stage(replay, film.width, film.height) as drawn:
         # A generator: a film of 100,000 frames would not fit into memory.
         frames = (drawn.frame(time) for time in times)
         if kind == ".png":

@@ -40,14 +40,14 @@ def names(runs: Sequence[StoredRun]) -> list[str]:
 
 
 def figures(runs: Sequence[StoredRun]) -> list[Drawn]:
-    """Return the figures with all runs overlaid; call it within `look.styled`."""
+    """Return the figures with all runs overlaid; call it within `look.project_style`."""
     drawn = [_foot_paths(runs), *(_lines(runs, *each) for each in PLOTS)]
     grounded = [run for run in runs if "ground_z" in run.record]
     return drawn + ([_lines(runs, *GROUND)] if grounded else [])
 
 
 def page(runs: Sequence[StoredRun], drawn: list[Drawn]) -> str:
-    """Return the page that compares runs; call it within `look.styled`."""
+    """Return the page that compares runs; call it within `look.project_style`."""
     called = names(runs)
     summary = f"{len(runs)} runs: {', '.join(called)}. Differences are to the first."
     parts = [
@@ -216,7 +216,7 @@ def _metrics(runs: Sequence[StoredRun]) -> str:
         head.append(Cell(f'<span class="swatch" style="background: {tint}"></span>{text(name)}'))
 
     rows: list[list[object]] = [
-        ["verdict", *(html.judged(run.metrics["verdict"] == "pass") for run in runs)],
+        ["verdict", *(html.verdict(run.metrics["verdict"] == "pass") for run in runs)],
         ["guards that tripped", *(_tripped(run) for run in runs)],
     ]
     limits = [{limit.key: limit for limit in numbers.limits(run)} for run in runs]
@@ -233,7 +233,7 @@ def _metrics(runs: Sequence[StoredRun]) -> str:
             if k and key in numbers.keys(runs[0]):
                 cell += f"<small>{text(difference(key, run, runs[0]))}</small>"
             if key in limits[k] and not limits[k][key].ok:
-                cell += f"<small>{html.judged(False, f', limit {bounds(limits[k][key])}')}</small>"
+                cell += f"<small>{html.verdict(False, f', limit {bounds(limits[k][key])}')}</small>"
             row.append(Cell(cell))
         rows.append(row)
 

@@ -103,7 +103,7 @@ def section(title: str, *parts: str) -> str:
 
 
 def figures(drawn: Sequence[Drawn]) -> str:
-    """Return figures, side by side if there is room; call it within `look.styled`."""
+    """Return figures, side by side if there is room; call it within `look.project_style`."""
     parts = [
         f'<figure id="{one.key}">\n<h3>{text(one.title)}</h3>\n'
         f"{look.svg(one.figure, one.key, one.alt)}\n"
@@ -137,7 +137,7 @@ def _class(column: int) -> str:
     return ' class="number"' if column else ""
 
 
-def judged(ok: bool, more: str = "") -> Cell:
+def verdict(ok: bool, more: str = "") -> Cell:
     """Return "pass" or "FAIL"."""
     # Both word and colour differ: not everybody sees colours, and paper may have none.
     word, kind = ("pass", "pass") if ok else ("FAIL", "fail")

@@ -84,7 +84,7 @@ def variables(dark: bool) -> str:
 
 
 @contextmanager
-def styled() -> Iterator[None]:
+def project_style() -> Iterator[None]:
     """Within, figures have the project's look, whatever the user's matplotlibrc says."""
     import matplotlib
 
@@ -97,14 +97,14 @@ def styled() -> Iterator[None]:
 
 
 def png(figure: Figure) -> bytes:
-    """Return a figure as PNG on white; call it within `styled`."""
+    """Return a figure as PNG on white; call it within `project_style`."""
     out = io.BytesIO()
     figure.savefig(out, format="png", dpi=200, facecolor="white")
     return out.getvalue()
 
 
 def svg(figure: Figure, key: str, alt: str) -> str:
-    """Return a figure as an SVG element in CSS colours; call it within `styled`.
+    """Return a figure as an SVG element in CSS colours; call it within `project_style`.
 
     Args:
         figure: The figure, drawn in the light colours.

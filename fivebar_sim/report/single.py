@@ -18,7 +18,7 @@ from fivebar_sim.runs.stored import StoredRun
 
 
 def figures(run: StoredRun) -> list[Drawn]:
-    """Return the figures of a run; call it within `look.styled`."""
+    """Return the figures of a run; call it within `look.project_style`."""
     drawn = [
         # On a wide screen two figures stand side by side, so neighbours are of similar height.
         in_plane.foot_path(run),
@@ -33,7 +33,7 @@ def figures(run: StoredRun) -> list[Drawn]:
 
 
 def page(run: StoredRun, drawn: list[Drawn]) -> str:
-    """Return the page of a run with its figures; call it within `look.styled`."""
+    """Return the page of a run with its figures; call it within `look.project_style`."""
     scenario = run.scenario
     parts = [
         _head(run),
@@ -76,14 +76,14 @@ def _head(run: StoredRun) -> str:
 def _limits(run: StoredRun) -> str:
     """Return the table of limits and guards: bound, value, and whether it holds."""
     rows = [
-        (SHOWN[limit.key][0], bounds(limit), shown(limit.key, limit.value), html.judged(limit.ok))
+        (SHOWN[limit.key][0], bounds(limit), shown(limit.key, limit.value), html.verdict(limit.ok))
         for limit in numbers.limits(run)
     ]
     for guard in run.metrics["guards"]:
         row = guards.ROWS[guard["name"]]
         allowed = f"<= {row.show(guard['high'])}"
         value = row.show(guard["value"])
-        rows.append((f"guard {row.name}", allowed, value, html.judged(guard["ok"])))
+        rows.append((f"guard {row.name}", allowed, value, html.verdict(guard["ok"])))
     return html.table(
         "The run passes if all of these hold.", ("metric", "limit", "value", ""), rows
     )

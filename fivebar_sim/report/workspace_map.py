@@ -38,8 +38,8 @@ def write(leg: FiveBar, out: Path, path: Array | None = None) -> Map:
     surveyed = survey(leg)
     figure = Figure(figsize=(7.0, 6.4), layout="constrained")
     _draw(figure.add_subplot(), leg, surveyed, path)
-    with whole_file.beside(out) as stage:
-        figure.savefig(stage, dpi=150)
+    with whole_file.stage(out) as place:
+        figure.savefig(place, dpi=150)
     return surveyed
 
 

@@ -42,7 +42,7 @@ def write(runs: Sequence[Path], out: Path | None = None, png: Path | None = None
     read = [stored.read(path) for path in runs]
     # All content is ready before the first file is written; the page comes last.
     files: dict[Path, bytes] = {}
-    with look.styled():
+    with look.project_style():
         drawn = single.figures(read[0]) if len(read) == 1 else comparison.figures(read)
         page = single.page(read[0], drawn) if len(read) == 1 else comparison.page(read, drawn)
         if png is not None:
