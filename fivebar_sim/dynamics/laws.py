@@ -43,8 +43,8 @@ def inverse(
         (tau_A, tau_E) [N m], positive with the angles, the rotors' share included, (..., 2).
 
     Raises:
-        LoopOpenError: Where the links do not meet.
-        SingularError: Where B, C and D are in line.
+        LoopOpenError: The links do not meet.
+        SingularError: B, C and D are in line.
         ArgumentError: Shapes that do not broadcast, numbers that are not finite, unknown
             assembly, negative payload or friction.
     """
@@ -69,8 +69,8 @@ def statics(
         (tau_A, tau_E) [N m], (..., 2).
 
     Raises:
-        LoopOpenError: Where the links do not meet.
-        SingularError: Where B, C and D are in line.
+        LoopOpenError: The links do not meet.
+        SingularError: B, C and D are in line.
         ArgumentError: As `inverse`.
     """
     return LegDynamics(leg, assembly).statics(theta, foot_force)
@@ -91,8 +91,8 @@ def mass_matrix(
         M [kg m^2], symmetric and positive definite, (..., 2, 2).
 
     Raises:
-        LoopOpenError: Where the links do not meet.
-        SingularError: Where B, C and D are in line: M is infinite.
+        LoopOpenError: The links do not meet.
+        SingularError: B, C and D are in line, so M is infinite.
         ArgumentError: As `inverse`.
     """
     return LegDynamics(leg, assembly, payload).mass_matrix(theta)
@@ -121,8 +121,8 @@ def bias(
         (..., 2) [N m]; at theta_dot = 0 the gradient of the potential energy.
 
     Raises:
-        LoopOpenError: Where the links do not meet.
-        SingularError: Where B, C and D are in line.
+        LoopOpenError: The links do not meet.
+        SingularError: B, C and D are in line.
         ArgumentError: As `inverse`.
     """
     return LegDynamics(leg, assembly, payload).bias(theta, theta_dot)
@@ -157,8 +157,8 @@ def forward(
         theta_ddot [rad/s^2], (..., 2).
 
     Raises:
-        LoopOpenError: Where the links do not meet.
-        SingularError: Where B, C and D are in line.
+        LoopOpenError: The links do not meet.
+        SingularError: B, C and D are in line.
         ArgumentError: As `inverse`.
     """
     model = LegDynamics(leg, assembly, payload)
@@ -186,8 +186,8 @@ def energy(
         (kinetic, potential) [J], each (...).
 
     Raises:
-        LoopOpenError: Where the links do not meet.
-        SingularError: Where B, C and D are in line.
+        LoopOpenError: The links do not meet.
+        SingularError: B, C and D are in line.
         ArgumentError: As `inverse`.
     """
     return LegDynamics(leg, assembly, payload).energy(theta, theta_dot)
@@ -211,8 +211,8 @@ def reflected_inertia(
         [kg], symmetric and positive definite, (..., 2, 2), axes (x, z) of the hip frame.
 
     Raises:
-        LoopOpenError: Where the links do not meet.
-        SingularError: Where B, C and D, or A, B and F, or E, D and C are in line.
+        LoopOpenError: The links do not meet.
+        SingularError: B, C and D, or A, B and F, or E, D and C are in line.
         ArgumentError: As `inverse`.
     """
     return LegDynamics(leg, assembly, payload).reflected_inertia(theta)
