@@ -21,7 +21,7 @@ from fivebar_sim.errors import ArgumentError, GeometryError, unknown
 from fivebar_sim.files import resources
 from fivebar_sim.geometry import LONGEST, FiveBar, Link, combined
 from fivebar_sim.integrator import CONNECT, Integrator, solref
-from fivebar_sim.kinematics.stops import stops_at_C
+from fivebar_sim.kinematics.stops import stops_at_B, stops_at_C
 from fivebar_sim.scenario.scenes import Ground, Payload, Scene, Treadmill, named
 
 JOINTS = ("A", "B", "E", "D")
@@ -138,7 +138,7 @@ def leg_spec(
     _size(spec, leg)
     _weigh(spec, leg)
     _drive(spec, servo, drive)
-    _close(spec, integrator, q)
+    _close(spec, leg, integrator, q)
 
     if isinstance(scene, Payload):
         _load(spec, leg, scene)
@@ -303,9 +303,10 @@ def _drive(spec: mujoco.MjSpec, servo: Servo | None, drive: Drive) -> None:
         spec.key("home").ctrl = np.zeros(len(spec.actuators))
 
 
-def _close(spec: mujoco.MjSpec, integrator: Integrator, q: Array) -> None:
+def _close(spec: mujoco.MjSpec, leg: FiveBar, integrator: Integrator, q: Array) -> None:
     """Set the loop's stiffness, and stops that keep the angle at C on the rest pose's branch."""
     connect = spec.equality("C")
     connect.solref = solref(integrator, spec.option.timestep)
     connect.solimp[:3] = CONNECT[integrator][1]
     spec.tendon("C_angle").range = stops_at_C(q)
+    spec.joint("B").range = stops_at_B(leg, q)

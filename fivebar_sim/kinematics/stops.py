@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from fivebar_sim.arrays import Array
+from fivebar_sim.geometry import FiveBar
+from fivebar_sim.kinematics.reach import foot_radius_and_angle
 
 C_STOP = float(np.radians(2.0))
 """Distance of the stops of the angle at C from 0 and from 180 deg [rad]."""
@@ -14,6 +16,23 @@ MOTOR_RANGE = 2.0 * np.pi
 
 SPEED_LIMIT = 1e4
 """Joint rate beyond which a simulation counts as diverged [rad/s]: a hundred thousand rpm."""
+
+
+def stops_at_B(leg: FiveBar, rest: Array) -> tuple[float, float]:
+    """Return the range of theta_B, a turn wide, about a rest pose (4,) [rad].
+
+    It ends on either side where the foot is folded back over the motor, theta_B + phi = +-pi, phi
+    the angle from BC to BF: there the working mode of side A ends.
+
+    Args:
+        leg: The leg.
+        rest: (theta_A, theta_B, theta_E, theta_D) [rad], (4,).
+    """
+    # With a bent extension BF is not along BC: a range of +-180 deg would cut the mode in two.
+    phi = foot_radius_and_angle(leg)[1]
+    turn = 2.0 * np.pi
+    middle = turn * float(np.round((rest[1] + phi) / turn)) - phi
+    return middle - np.pi, middle + np.pi
 
 
 def angle_at_C(q: Array) -> Array:
