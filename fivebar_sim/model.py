@@ -133,7 +133,7 @@ def leg_spec(
     spec.option.gravity = (gx, 0.0, gz)
 
     # The model is compiled in this pose: a closed one, far from every singularity.
-    q = kinematics.home(leg)
+    q = kinematics.hanging(leg) if isinstance(scene, Ground) else kinematics.home(leg)
     _place(spec, leg, q)
     _size(spec, leg)
     _weigh(spec, leg)
@@ -156,6 +156,12 @@ def _load(spec: mujoco.MjSpec, leg: FiveBar, scene: Payload) -> None:
 
 def _stand(spec: mujoco.MjSpec, leg: FiveBar, scene: Ground, q: Array) -> None:
     """Put hip and trunk on the rail; in the keyframes the foot stands on the floor."""
+    if not leg.gravity[1] < 0.0:
+        raise GeometryError(
+            f"leg {leg.name!r} cannot stand: its gravity along z must be below 0 m/s^2, "
+            f"got {leg.gravity[1]:g}"
+        )
+
     spec.body("hip").pos = (0.0, 0.0, 0.0)
     hip_z = spec.joint("hip_z")
     # With reference 0 the joint's coordinate is the hip's height above the floor itself.

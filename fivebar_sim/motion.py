@@ -14,7 +14,8 @@ from fivebar_sim.kinematics.stops import (
     C_STOP,
     MOTOR_RANGE,
     angle_at_C,
-    stops_at_B,
+    in_range,
+    in_turn,
     stops_at_C,
 )
 from fivebar_sim.paths import FootPath, Sample
@@ -133,8 +134,8 @@ def poses(leg: FiveBar, foot: Array) -> Array:
     except UnreachableError as error:
         raise _out_of_reach(leg, foot, at_rest, error) from None
 
-    q = _in_turn(leg, rest, angles, angles)
-    q = _in_range(q, q, q)
+    q = in_turn(leg, rest, angles, angles)
+    q = in_range(q, q, q)
     _check_stops(leg, rest, foot, at_rest, q)
     return q
 
@@ -213,57 +214,8 @@ def _continuous(leg: FiveBar, rest: Array, q: Array) -> Array:
     The knees stay within half a turn in any working mode; the motors may go round.
     """
     q = np.unwrap(q, axis=0)
-    q = _in_turn(leg, rest, q, q[0])
-    return _in_range(q, q.min(axis=0), q.max(axis=0))
-
-
-def _in_turn(leg: FiveBar, rest: Array, q: Array, begun: Array) -> Array:
-    """Return angles (n, 4) with the motors in the turns that bring `begun` next to the rest pose.
-
-    Theta_E is put in the turn in which the angle at C is between its stops, as in the rest pose.
-
-    Args:
-        leg: The leg.
-        rest: The rest pose [rad], (4,).
-        q: The angles [rad], (n, 4).
-        begun: The pose that decides for all of them, (4,), or one for each, (n, 4).
-    """
-    turn = 2.0 * np.pi
-    turns = np.zeros_like(begun)
-    middle_B = 0.5 * sum(stops_at_B(leg, rest))
-    turns[..., 1] = turn * np.round((middle_B - begun[..., 1]) / turn)
-    turns[..., [0, 2]] = turn * np.round((rest - begun) / turn)[..., [0, 2]]
-    q = q + turns
-    # A and E were shifted separately; the stops at C decide which turn E is really in.
-    middle = 0.5 * sum(stops_at_C(rest))
-    q[:, 2] += turn * np.round((angle_at_C(begun + turns) - middle) / turn)
-    return q
-
-
-def _in_range(q: Array, low: Array, high: Array) -> Array:
-    """Return angles (n, 4) with both motors in a turn that keeps them in their range, if any does.
-
-    Turning both by as much changes no pose, and keeps the angle at C.
-
-    Args:
-        q: The angles [rad], (n, 4).
-        low: The least of each joint's angles, over all rows, (4,), or of every row, (n, 4).
-        high: The greatest, likewise.
-    """
-    shift = np.zeros(low.shape[:-1])
-    for turn in (-2.0 * np.pi, 2.0 * np.pi):
-        better = ~_fits(low, high) & _fits(low + turn, high + turn)
-        shift = np.where(better, turn, shift)
-
-    q = q.copy()
-    q[:, 0] += shift
-    q[:, 2] += shift
-    return q
-
-
-def _fits(low: Array, high: Array) -> Bools:
-    """Return where both motors stay in their range."""
-    return ((low >= -MOTOR_RANGE) & (high <= MOTOR_RANGE))[..., [0, 2]].all(axis=-1)
+    q = in_turn(leg, rest, q, q[0])
+    return in_range(q, q.min(axis=0), q.max(axis=0))
 
 
 def _check_stops(leg: FiveBar, rest: Array, foot: Array, time: Array, q: Array) -> None:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 from typing import Any, get_args
 
 import mujoco
 import numpy as np
 import pytest
+from fivebar_controllers.servo import Servo as Setpoint
 from mujoco.batch import Batch
 
 from fivebar_sim import dynamics, kinematics, model, rollout
@@ -16,6 +18,7 @@ from fivebar_sim.errors import ArgumentError, ConfigError, GeometryError
 from fivebar_sim.files import resources
 from fivebar_sim.geometry import FiveBar
 from fivebar_sim.integrator import Integrator
+from fivebar_sim.paths import Line
 from fivebar_sim.rollout import Result
 from fivebar_sim.scenario import Scenario, scenes
 from fivebar_sim.scenario.scenes import Air, Ground, Payload, Rail, Scene, Treadmill
@@ -252,13 +255,47 @@ def test_load_of_a_held_foot_is_that_of_statics(
     np.testing.assert_allclose(torque, expected, rtol=0, atol=1e-4 * np.abs(expected).max())
 
 
+@pytest.mark.parametrize(
+    ("leg", "high", "low"),
+    [
+        (replace(CLASSIC, mode=(1, -1), assembly=1), -0.075, -0.08),
+        (FiveBar(0.02, 0.1, 0.05, 0.09, 0.03, tilt=1.57), -0.096, -0.1),
+    ],
+    ids=["upside down", "tilted"],
+)
+def test_leg_whose_rest_pose_is_above_its_hip_stands_where_it_hangs(
+    leg: FiveBar, high: float, low: float
+) -> None:
+    assert kinematics.chain_points(leg, kinematics.home(leg)).F[1] > 0.0
+    mj = model.build(leg, scene="rail")
+    data = at(mj, "home")
+    foot = data.geom("foot").xpos[2] - leg.foot_radius
+    assert foot == pytest.approx(0.0, abs=1e-12)
+    squat = Scenario(
+        name="squat",
+        leg=leg,
+        path=Line(start=(0.0, high), stop=(0.0, low), frequency=1.0),
+        controller=Setpoint(feedforward="torque"),
+        controller_name="servo",
+        scene=Rail(mass=0.3),
+        duration=1.5,
+    )
+    result = rollout.run(squat)
+    assert result.verdict == "pass"
+    assert result.metrics["tracking"]["rms"] < 1e-3
+
+
 # refusal
 
 
 @pytest.mark.parametrize("scene", ["rail", "treadmill"])
 def test_refusal_of_a_leg_that_cannot_stand(scene: str) -> None:
-    with pytest.raises(GeometryError, match=r"^leg 'airhockey' cannot stand: its foot must be b"):
-        model.build(FiveBar.load("airhockey"), scene=scene)
+    upward = FiveBar(0.02, 0.09, 0.09, 0.02, 0.05, 0.02, 2.0, assembly=1, name="upward")
+    weightless = replace(CLASSIC, gravity=(0.0, 0.0))
+    with pytest.raises(GeometryError, match=r"gravity along z must be below 0 m/s\^2, got 0$"):
+        model.build(weightless, scene=scene)
+    with pytest.raises(GeometryError, match=r"^leg 'upward' cannot stand: its foot must be below"):
+        model.build(upward, scene=scene)
     settings = ["leg=airhockey", "path.centre=[0, 0.6]", f"scene={{kind='{scene}'}}"]
     settings += ["scene.speed=0.0"] if scene == "treadmill" else []
     with pytest.raises(GeometryError) as caught:

@@ -16,7 +16,7 @@ from fivebar_sim.kinematics.closure import (
     passive,
 )
 from fivebar_sim.kinematics.half_angle import inverse_half_angle, inverse_within
-from fivebar_sim.kinematics.home import home
+from fivebar_sim.kinematics.home import hanging, home
 from fivebar_sim.kinematics.rates import JointMotion, jacobian, joint_motion
 from fivebar_sim.kinematics.reach import inverse, inverse_all, inverse_nearest
 
@@ -29,6 +29,7 @@ __all__ = [
     "chain_points",
     "closed_points",
     "forward",
+    "hanging",
     "home",
     "inverse",
     "inverse_all",

@@ -9,9 +9,10 @@ import numpy as np
 from fivebar_sim.arrays import Array
 from fivebar_sim.errors import GeometryError
 from fivebar_sim.geometry import FiveBar
-from fivebar_sim.kinematics.closure import bases, branch
+from fivebar_sim.kinematics.closure import bases, branch, chain_points
 from fivebar_sim.kinematics.planar import angle_between, cross, dot
 from fivebar_sim.kinematics.reach import points_at, solve
+from fivebar_sim.kinematics.stops import in_turn
 
 GRID = 121
 """Number of foot positions tried along x and along z."""
@@ -41,16 +42,51 @@ def home(leg: FiveBar) -> Array:
 @lru_cache(maxsize=256)
 def _home(leg: FiveBar) -> Array:
     """Return what `home` does."""
-    line = np.linspace(-1.0, 1.0, GRID) * (leg.size + leg.L5)
-    column = np.stack([np.zeros(GRID), line], axis=-1)
-    plane = np.stack(np.meshgrid(line, line, indexing="ij"), axis=-1).reshape(-1, 2)
-    for foot in (column, plane):
-        pose = _best(leg, foot)
+    for feet in _grids(leg):
+        pose = _best(leg, feet)
         if pose is not None:
             return pose
     raise GeometryError(
         f"no pose has working mode {leg.mode} and assembly mode {leg.assembly} at once"
     )
+
+
+def hanging(leg: FiveBar) -> Array:
+    """Return the rest pose of a leg that stands: `home`, over feet below the hip if it is not.
+
+    Args:
+        leg: The leg.
+
+    Returns:
+        (theta_A, theta_B, theta_E, theta_D) [rad], in the turns of `home`, (4,); `home` itself
+        where the leg does not reach below its hip.
+
+    Raises:
+        GeometryError: As `home`.
+    """
+    rest = home(leg)
+    if chain_points(leg, rest).F[1] < 0.0:
+        return rest
+    return _hanging(leg).copy()
+
+
+@lru_cache(maxsize=256)
+def _hanging(leg: FiveBar) -> Array:
+    """Return what `hanging` does, of a leg whose rest pose is above its hip."""
+    rest = _home(leg)
+    for feet in _grids(leg):
+        pose = _best(leg, feet[feet[:, 1] < 0.0])
+        if pose is not None:
+            return in_turn(leg, rest, pose[None], pose)[0]
+    return rest
+
+
+def _grids(leg: FiveBar) -> tuple[Array, Array]:
+    """Return the foot positions that are tried: a column through O, then the whole plane."""
+    line = np.linspace(-1.0, 1.0, GRID) * (leg.size + leg.L5)
+    column = np.stack([np.zeros(GRID), line], axis=-1)
+    plane = np.stack(np.meshgrid(line, line, indexing="ij"), axis=-1).reshape(-1, 2)
+    return column, plane
 
 
 def _best(leg: FiveBar, foot: Array) -> Array | None:

@@ -143,7 +143,12 @@ class Task(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
     @property
     def home(self) -> Array:
         """The foot in the leg's rest pose [m], hip frame, (2,)."""
-        return kinematics.chain_points(self.leg, kinematics.home(self.leg)).F
+        return kinematics.chain_points(self.leg, self._rest).F
+
+    @property
+    def _rest(self) -> Array:
+        """The leg's rest pose, standing where there is a ground, (4,)."""
+        return kinematics.hanging(self.leg) if self.GROUNDED else kinematics.home(self.leg)
 
     @property
     def scene(self) -> Scene:
@@ -173,7 +178,7 @@ class Task(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
         if self.action == "torque":
             assert self.servo.limit is not None
             return np.full(2, -self.servo.limit), np.full(2, self.servo.limit)
-        rest = kinematics.home(self.leg)[::2]
+        rest = self._rest[::2]
         low = rest - self.span
         high = rest + self.span
         if self.action == "position":
