@@ -15,11 +15,12 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 from fivebar_sim.checks import check_number
 from fivebar_sim.errors import ConfigError, GeometryError, unknown
 from fivebar_sim.files import resources, tables
+from fivebar_sim.links import Link, ball, capsule, combined, moved
 
 Mode = tuple[int, int]
 Four = tuple[float, float, float, float]
@@ -28,67 +29,18 @@ MODES: tuple[Mode, ...] = ((-1, -1), (-1, 1), (1, -1), (1, 1))
 """The working modes (s_A, s_E), in the order of `kinematics.inverse_all`."""
 
 
-class Link(NamedTuple):
-    """The inertia of one rigid link, in its own frame.
-
-    Attributes:
-        mass: [kg].
-        com: Centre of mass (along, across) [m] from the inner joint; along points to the outer
-            joint, across is along turned by +90 deg (towards growing theta).
-        inertia: About the centre of mass, about the axis normal to the leg plane [kg m^2].
-    """
-
-    mass: float
-    com: tuple[float, float]
-    inertia: float
-
-
-def capsule(length: float, radius: float, density: float) -> Link:
-    """Return the inertia of a capsule whose caps are centred on the link's two joints.
-
-    Cylinder m_c = rho pi r^2 L and two half balls, together m_s = rho 4/3 pi r^3:
-
-        I = m_c (L^2 / 12 + r^2 / 4) + m_s (2 r^2 / 5 + L^2 / 4 + 3 L r / 8)
-    """
-    L = length
-    r = radius
-    m_c = density * math.pi * r**2 * L
-    m_s = density * 4.0 / 3.0 * math.pi * r**3
-    inertia = m_c * (L**2 / 12 + r**2 / 4) + m_s * (2 * r**2 / 5 + L**2 / 4 + 3 * L * r / 8)
-    return Link(m_c + m_s, (L / 2, 0.0), inertia)
-
-
-def ball(radius: float, density: float) -> Link:
-    """Return the inertia of a ball about its centre: m = rho 4/3 pi r^3, I = 2/5 m r^2."""
-    mass = density * 4.0 / 3.0 * math.pi * radius**3
-    return Link(mass, (0.0, 0.0), 0.4 * mass * radius**2)
-
-
-def moved(body: Link, at: tuple[float, float], angle: float = 0.0) -> Link:
-    """Return a body turned by angle [rad] about its frame's origin, then shifted by `at` [m]."""
-    x, y = body.com
-    c = math.cos(angle)
-    s = math.sin(angle)
-    return Link(body.mass, (at[0] + c * x - s * y, at[1] + s * x + c * y), body.inertia)
-
-
-def combined(*bodies: Link) -> Link:
-    """Return several bodies in one frame as one body, by the parallel axis theorem."""
-    mass = sum(b.mass for b in bodies)
-    # Without mass there is no centre of mass: any of the bodies is the answer.
-    if mass == 0.0:
-        return bodies[0]
-    x = sum(b.mass * b.com[0] for b in bodies) / mass
-    y = sum(b.mass * b.com[1] for b in bodies) / mass
-    inertia = sum(b.inertia + b.mass * ((b.com[0] - x) ** 2 + (b.com[1] - y) ** 2) for b in bodies)
-    return Link(mass, (x, y), inertia)
-
-
 CLOSING = 1e-12
 """Relative slack of the closing condition: the rounding of lengths given in decimals."""
 
 LONGEST = 1e3
 """Largest length [m]."""
+
+SHORT = 1e-3
+LONG = 3.0
+"""Least and greatest length of a link that is not doubted [m]."""
+
+SCALES = ("leg", "any")
+"""Whether lengths that no leg of a robot has are refused."""
 
 HEAVIEST = 1e6
 """Largest mass [kg], inertia [kg m^2] and density [kg/m^3]."""
@@ -124,6 +76,8 @@ class FiveBar:
         armature: Rotor inertia of each motor, reflected to A and E [kg m^2].
         gravity: (x, z) in the hip frame [m/s^2].
         name: Name in tables and pictures.
+        scale: "leg" refuses links outside `SHORT` to `LONG`, which mostly are lengths in another
+            unit than metres; "any" takes any length.
     """
 
     L1: float = 0.040
@@ -145,6 +99,7 @@ class FiveBar:
     armature: float = 1e-5
     gravity: tuple[float, float] = (0.0, -9.81)
     name: str = "custom"
+    scale: str = "leg"
 
     def __post_init__(self) -> None:
         for key in ("L1", "L2", "L3", "L4", "radius", "foot_radius"):
@@ -153,6 +108,7 @@ class FiveBar:
         for key in ("L5", "L6"):
             _check(key, getattr(self, key), low=0.0, high=LONGEST)
 
+        self._check_scale()
         for key in ("density", "armature"):
             _check(key, getattr(self, key), low=0.0, high=HEAVIEST, strict=key == "density")
 
@@ -175,6 +131,24 @@ class FiveBar:
             raise GeometryError(
                 f"{longest}: the links can never close: the longest may be at most as long as "
                 f"the other four together, {others:g} m, got {lengths[longest]:g} m"
+            )
+
+    def _check_scale(self) -> None:
+        if self.scale not in SCALES:
+            raise GeometryError(f"scale must be one of {SCALES}, got {self.scale!r}")
+        if self.scale == "any":
+            return
+        for key in ("L1", "L2", "L3", "L4", "L5", "L6"):
+            length = getattr(self, key)
+            # A coaxial leg has L5 = 0 or next to it, and most legs have no L6.
+            least = 0.0 if key in ("L5", "L6") else SHORT
+            if least <= length <= LONG:
+                continue
+            meant = [m for m in (length / 1000.0, length * 1000.0) if SHORT <= m <= LONG]
+            hint = f"; did you mean {meant[0]:g}?" if meant else ""
+            raise GeometryError(
+                f"{key} must be in [{least:g}, {LONG:g}] m, got {length:g}: lengths are in "
+                f'metres{hint} (scale = "any" allows it)'
             )
 
     def _check_modes(self) -> None:

@@ -19,9 +19,10 @@ from fivebar_sim.arrays import Array
 from fivebar_sim.control.servo import Drive, Servo
 from fivebar_sim.errors import ArgumentError, GeometryError, unknown
 from fivebar_sim.files import resources
-from fivebar_sim.geometry import LONGEST, FiveBar, Link, combined
+from fivebar_sim.geometry import LONGEST, FiveBar
 from fivebar_sim.integrator import CONNECT, Integrator, solref
 from fivebar_sim.kinematics.stops import stops_at_B, stops_at_C
+from fivebar_sim.links import Link, combined
 from fivebar_sim.scenario.scenes import Ground, Payload, Scene, Treadmill, named
 
 JOINTS = ("A", "B", "E", "D")
@@ -199,7 +200,7 @@ def standing(leg: FiveBar, q: Array) -> float:
     height = leg.foot_radius - float(kinematics.chain_points(leg, q).F[1])
     if not height > 0.0:
         raise GeometryError(
-            f"leg {leg.name!r} cannot stand: its foot must be below the hip, "
+            f"leg {leg.name!r} cannot stand: its foot must be below the hip (z points up), "
             f"got {1e3 * (leg.foot_radius - height):.4g} mm above"
         )
     return height

@@ -246,8 +246,11 @@ def _out_of_reach(
     lost = f"path out of reach at t = {time[k]:g} s: the foot at {_mm(foot[k])}"
     nearest = workspace.nearest(leg, foot[k], mode=leg.mode)
     out = float(np.hypot(*(foot[k] - nearest)))
+    # A hundred legs away nobody means metres: 0.08 m read as 80.
+    far = np.hypot(*foot[k]) > 100.0 * leg.size
+    hint = "; positions are in metres: were these in mm?" if far else ""
     return UnreachableError(
-        f"{lost} is {1e3 * out:.3g} mm out; the nearest reachable point is {_mm(nearest)}",
+        f"{lost} is {1e3 * out:.3g} mm out; the nearest reachable point is {_mm(nearest)}{hint}",
         error.index,
     )
 

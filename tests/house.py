@@ -14,6 +14,7 @@ PACKAGES = {"fivebar_sim": "fivebar_sim", "fivebar_controllers": "controllers/fi
 LEVELS = (
     "errors",
     "arrays checks files",
+    "links",
     "geometry integrator paths",
     "kinematics",
     "analysis dynamics workspace",

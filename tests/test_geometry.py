@@ -12,7 +12,8 @@ import pytest
 
 from fivebar_sim.errors import ConfigError, GeometryError
 from fivebar_sim.files import resources
-from fivebar_sim.geometry import MODES, FiveBar, Link, ball, capsule, combined, moved, read_table
+from fivebar_sim.geometry import MODES, FiveBar, read_table
+from fivebar_sim.links import Link, ball, capsule, combined, moved
 
 CLASSIC = FiveBar()
 LUMPED = FiveBar(
@@ -162,13 +163,32 @@ def test_leg_is_frozen_and_a_value() -> None:
 
 
 @pytest.mark.parametrize(
+    ("lengths", "message"),
+    [
+        ({"L1": 40, "L2": 60}, r"^L1 must be in \[0.001, 3\] m, got 40: .*; did you mean 0.04\?"),
+        ({"L4": 4e-5}, r"^L4 must be in \[0.001, 3\] m, got 4e-05: .*; did you mean 0.04\?"),
+        ({"L5": 30}, r"^L5 must be in \[0, 3\] m, got 30: .*; did you mean 0.03\?"),
+        ({"L6": 90}, r"^L6 must be in \[0, 3\] m, got 90: .*; did you mean 0.09\?"),
+        ({"scale": "mm"}, r"^scale must be one of \('leg', 'any'\), got 'mm'$"),
+    ],
+)
+def test_lengths_in_another_unit_are_asked_about(lengths: dict[str, Any], message: str) -> None:
+    with pytest.raises(GeometryError, match=message):
+        FiveBar(**lengths)
+
+
+def test_any_scale_is_legal_where_it_is_meant() -> None:
+    assert FiveBar(40.0, 60.0, 60.0, 40.0, 30.0, scale="any").size == 100.0
+
+
+@pytest.mark.parametrize(
     "legal",
     [
         {"L5": 0.0},
         {"L1": 0.25, "L2": 0.25, "L3": 0.25, "L4": 0.25, "L5": 1.0},  # only one pose: stretched
         {"L1": 0.1875, "L2": 0.0625, "L3": 0.0625, "L4": 0.0625, "L5": 0.0},
         {"bend": math.pi, "tilt": -math.pi, "L6": 1.0},
-        {"armature": 0.0, "gravity": (0, 0), "L1": 1e-6, "L4": 1e-6},
+        {"armature": 0.0, "gravity": (0, 0), "L1": 1e-6, "L4": 1e-6, "scale": "any"},
         {"com": (-0.1, 0.5, 0.0, 1.0), "mass": (1, 1, 1, 1)},
         *({"mode": mode, "assembly": 1} for mode in MODES),
     ],

@@ -90,6 +90,15 @@ def test_poses_out_of_reach_are_refused_by_row() -> None:
     assert caught.value.index == (1,)
 
 
+def test_path_in_millimetres_is_asked_about() -> None:
+    path = Circle(centre=(0.0, -72.0), radius=10.0, frequency=1.0)
+    with pytest.raises(UnreachableError, match=r"positions are in metres: were these in mm\?$"):
+        plan(CLASSIC, path, 100, H)
+    near = Circle(centre=(0.0, -0.3), radius=0.01, frequency=1.0)
+    with pytest.raises(UnreachableError, match=r"\(0.00, -98.87\) mm$"):
+        plan(CLASSIC, near, 100, H)
+
+
 def test_a_rest_pose_is_the_callers_own() -> None:
     kinematics.home(CLASSIC)[:] = 0.0
     assert kinematics.home(CLASSIC).any()

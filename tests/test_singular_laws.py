@@ -32,7 +32,7 @@ def stretched(size: float, sine: float) -> tuple[FiveBar, Array]:
 def scaled(leg: FiveBar, size: float) -> FiveBar:
     """Return a leg of size times the lengths of the links."""
     L1, L2, L3, L4, L5 = (size * L for L in (leg.L1, leg.L2, leg.L3, leg.L4, leg.L5))
-    return FiveBar(L1, L2, L3, L4, L5)
+    return FiveBar(L1, L2, L3, L4, L5, scale="any")
 
 
 @pytest.mark.parametrize("size", SIZES)

@@ -22,7 +22,7 @@ Draw = Callable[[np.random.Generator], FiveBar]
 
 def of_lengths(L: Array, L5: float, tilt: float = 0.0) -> FiveBar:
     L1, L2, L3, L4 = L.tolist()
-    return FiveBar(L1, L2, L3, L4, float(L5), tilt=float(tilt))
+    return FiveBar(L1, L2, L3, L4, float(L5), tilt=float(tilt), scale="any")
 
 
 def any_leg(rng: np.random.Generator) -> FiveBar:

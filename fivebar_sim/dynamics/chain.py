@@ -29,8 +29,9 @@ import numpy as np
 from fivebar_sim import kinematics
 from fivebar_sim.checks import check_number
 from fivebar_sim.errors import ArgumentError
-from fivebar_sim.geometry import HEAVIEST, FiveBar, Link, combined
+from fivebar_sim.geometry import HEAVIEST, FiveBar
 from fivebar_sim.kinematics.rates import SINGULAR
+from fivebar_sim.links import Link, combined
 
 Scalar = Any
 """A float, or an array of shape (...)."""
