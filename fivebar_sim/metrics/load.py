@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
+import msgspec
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -14,6 +15,17 @@ from fivebar_sim.arrays import Array, Bools, at, first_index
 from fivebar_sim.checks import check_number
 from fivebar_sim.errors import ArgumentError
 from fivebar_sim.metrics.columns import MOTORS
+from fivebar_sim.metrics.json_types import Motors
+from fivebar_sim.metrics.sharing import (
+    UNDEFINED,
+    Bins,
+    Opposing,
+    Phase,
+    Share,
+    Sharing,
+    Work,
+    Works,
+)
 
 TINY = 1e-6
 """Torque or work of at most this part of the window's largest counts as none: it is the rounding
@@ -75,23 +87,40 @@ def measure(
             continuous, not wrapped.
         timestep: [s].
         stance: In which steps the foot stands, (N,) bools: "stance" is then the same in those.
-        phase: Of every step in its gait cycle, in [0, 1), (N,): "phase" then has share_A and
+        phase: Phase of every step in its gait cycle, in [0, 1), (N,): "phase" then has share_A and
             torque_rms of A and of E in each bin.
-        bins: How many; bin i is [i, i + 1) / bins.
+        bins: Number of bins; bin i is [i, i + 1) / bins.
 
     Raises:
         ArgumentError: Other shapes, numbers outside their range or not finite, no steps.
     """
+    found = sharing(torque, theta, timestep, stance=stance, phase=phase, bins=bins)
+    return msgspec.to_builtins(found)
+
+
+def sharing(
+    torque: ArrayLike,
+    theta: ArrayLike,
+    timestep: float,
+    *,
+    stance: ArrayLike | None = None,
+    phase: ArrayLike | None = None,
+    bins: int = 8,
+) -> Sharing:
+    """Return what `measure` does, with a type: the arguments and errors are the same."""
     steps = _steps(torque, theta, timestep)
     rows = len(steps.torque)
-    measured = whole = _over(steps, np.ones(rows, dtype=bool))
+    found = Sharing(**msgspec.structs.asdict(_over(steps, np.ones(rows, dtype=bool))))
+
     if stance is not None:
         chosen = _mask(stance, rows)
-        part = _over(steps, chosen) if chosen.any() else _undefined(whole)
-        measured = {**measured, "stance": part}
+        part = _over(steps, chosen) if chosen.any() else UNDEFINED
+        found = msgspec.structs.replace(found, stance=part)
+
     if phase is not None:
-        measured = {**measured, "phase": _histogram(steps, phase, bins)}
-    return measured
+        found = msgspec.structs.replace(found, phase=_histogram(steps, phase, bins))
+
+    return found
 
 
 def _steps(torque: ArrayLike, theta: ArrayLike, timestep: float) -> _Steps:
@@ -111,7 +140,7 @@ def _steps(torque: ArrayLike, theta: ArrayLike, timestep: float) -> _Steps:
     return _Steps(tau, work, _against(work), float(np.abs(tau).max()), timestep)
 
 
-def _over(steps: _Steps, chosen: Bools) -> dict[str, Any]:
+def _over(steps: _Steps, chosen: Bools) -> Share:
     """Return the measures over the chosen steps, of which there is at least one."""
     tau = steps.torque[chosen]
     work = steps.work[chosen]
@@ -122,26 +151,27 @@ def _over(steps: _Steps, chosen: Bools) -> dict[str, Any]:
     given = np.maximum(work, 0.0).sum(axis=0)
     taken = np.minimum(work, 0.0).sum(axis=0)
 
-    return {
-        "torque_rms": _named(rms),
-        "torque_peak": _named(peak),
-        "share_A": _share(tau, floor, 1),
-        "thermal_share_A": _share(tau, floor, 2),
-        "peak_ratio": _ratio(peak, floor),
-        "rms_ratio": _ratio(rms, floor),
-        "work": {
-            motor: {"positive": gain, "negative": loss, "net": gain + loss}
-            for motor, gain, loss in zip(MOTORS, given.tolist(), taken.tolist(), strict=True)
-        },
-        "opposing": {
-            "fraction": float(steps.against[chosen].mean()),
-            "first": steps.timestep * int(np.argmax(against)) if against.any() else None,
-            "energy": float(np.abs(steps.work[against]).min(axis=1).sum()),
-        },
-    }
+    works = [
+        Work(positive=gain, negative=loss, net=gain + loss)
+        for gain, loss in zip(given.tolist(), taken.tolist(), strict=True)
+    ]
+    return Share(
+        torque_rms=_named(rms),
+        torque_peak=_named(peak),
+        share_A=_share(tau, floor, 1),
+        thermal_share_A=_share(tau, floor, 2),
+        peak_ratio=_ratio(peak, floor),
+        rms_ratio=_ratio(rms, floor),
+        work=Works(**dict(zip(MOTORS, works, strict=True))),
+        opposing=Opposing(
+            fraction=float(steps.against[chosen].mean()),
+            first=float(steps.timestep) * int(np.argmax(against)) if against.any() else None,
+            energy=float(np.abs(steps.work[against]).min(axis=1).sum()),
+        ),
+    )
 
 
-def _histogram(steps: _Steps, phase: ArrayLike, bins: int) -> dict[str, Any]:
+def _histogram(steps: _Steps, phase: ArrayLike, bins: int) -> Phase:
     """Return share_A and torque_rms in bins of the gait phase, a list of each."""
     if not isinstance(bins, (int, np.integer)) or not 1 <= bins <= BINS_MAX:
         raise ArgumentError(f"bins must be a whole number in [1, {BINS_MAX}], got {bins!r}")
@@ -158,12 +188,12 @@ def _histogram(steps: _Steps, phase: ArrayLike, bins: int) -> dict[str, Any]:
 
     bin_of = (cycle * bins).astype(int)  # below bins: the float before 1 does not round up to it
     parts = [steps.torque[bin_of == i] for i in range(bins)]
-    rms = [_named(_rms(part)) if len(part) else dict.fromkeys(MOTORS) for part in parts]
+    rms = [_named(_rms(part)) if len(part) else Motors(A=None, E=None) for part in parts]
 
-    return {
-        "share_A": [_share(part, TINY * steps.peak, 1) for part in parts],
-        "torque_rms": {motor: [each[motor] for each in rms] for motor in MOTORS},
-    }
+    return Phase(
+        share_A=[_share(part, TINY * steps.peak, 1) for part in parts],
+        torque_rms=Bins(A=[each.A for each in rms], E=[each.E for each in rms]),
+    )
 
 
 def _against(work: Array) -> Bools:
@@ -195,16 +225,8 @@ def _ratio(pair: Array, floor: float) -> float | None:
     return large / small if small > floor else None
 
 
-def _named(pair: Array) -> dict[str, float]:
-    return dict(zip(MOTORS, pair.tolist(), strict=True))
-
-
-def _undefined(measured: dict[str, Any]) -> dict[str, Any]:
-    """Return the same keys with None for every number."""
-    return {
-        key: _undefined(value) if isinstance(value, dict) else None
-        for key, value in measured.items()
-    }
+def _named(pair: Array) -> Motors:
+    return Motors(**dict(zip(MOTORS, pair.tolist(), strict=True)))
 
 
 def _numbers(values: ArrayLike, name: str) -> Array:
