@@ -117,7 +117,7 @@ def _draw(result: Result, place: Path) -> list[str]:
     from fivebar_sim.report import in_plane, look, over_time
     from fivebar_sim.runs.stored import StoredRun
 
-    run = StoredRun(place, result.scenario, result.record, result.metrics)
+    run = StoredRun(place, result.scenario, result.record, result.measured)
     names = []
     with look.project_style():
         for drawn in (in_plane.foot_path(run), over_time.tracking_error(run)):

@@ -11,6 +11,7 @@ import numpy as np
 from fivebar_sim.errors import ArgumentError, DivergedError
 from fivebar_sim.metrics.columns import Record
 from fivebar_sim.metrics.limits import Limit, judge
+from fivebar_sim.metrics.measured import Judged, with_verdict
 from fivebar_sim.metrics.tracking import lost_path
 from fivebar_sim.scenario import Scenario
 from fivebar_sim.simulation import feedback, measure
@@ -26,13 +27,13 @@ class Result(NamedTuple):
     Attributes:
         scenario: What was run.
         record: The columns of rollout.parquet, each (N,), SI.
-        metrics: What metrics.json says.
+        measured: What was measured and judged: all of metrics.json, with types.
         limits: Every limit with its value.
     """
 
     scenario: Scenario
     record: Record
-    metrics: dict[str, Any]
+    measured: Judged
     limits: list[Limit]
 
     def __repr__(self) -> str:
@@ -51,12 +52,17 @@ class Result(NamedTuple):
 
         found = stored.read(Path(path))
         limits = judge(found.metrics, found.scenario.limits)
-        return cls(found.scenario, found.record, found.metrics, limits)
+        return cls(found.scenario, found.record, found.measured, limits)
+
+    @property
+    def metrics(self) -> dict[str, Any]:
+        """What metrics.json says: `measured` as nested dictionaries, the same ones every time."""
+        return self.measured.table
 
     @property
     def verdict(self) -> str:
         """Either "pass" or "fail"."""
-        return self.metrics["verdict"]
+        return self.measured.verdict
 
     def write(self, path: str | Path) -> Path:
         """Write the run directory; see `run_directory.write`."""
@@ -171,15 +177,9 @@ def _result(planned: Plan, states: States) -> Result:
     except ArgumentError as error:  # torques that no motor could have
         raise broken(planned, states, DivergedError(str(error), scenario.sim.timestep)) from error
 
-    limits = judge(measured, scenario.limits)
-    good = all(limit.ok for limit in limits) and all(each["ok"] for each in measured["guards"])
-    measured["verdict"] = "pass" if good else "fail"
-    measured["limits"] = [
-        {**limit._asdict(), "low": None if limit.low == -np.inf else limit.low} for limit in limits
-    ]
-    measured["provenance"] = provenance(scenario)
-
-    return Result(scenario, record, measured, limits)
+    limits = judge(measured.table, scenario.limits)
+    judged = with_verdict(measured, limits, provenance(scenario))
+    return Result(scenario, record, judged, limits)
 
 
 def _check_resolution(scenario: Scenario) -> None:

@@ -9,27 +9,29 @@ from typing import Any, NamedTuple
 
 import msgspec
 import numpy as np
+from judged import judged
 from rerun.chunk import RrdReader
 
 from fivebar_sim import kinematics
 from fivebar_sim.arrays import Array
 from fivebar_sim.geometry import FiveBar
+from fivebar_sim.metrics.measured import Judged
 from fivebar_sim.recording import rrd
 from fivebar_sim.scenario import Scenario
 
 # all lengths different, so that a swap of two links is seen
 LEG = FiveBar(L1=0.04, L2=0.06, L3=0.055, L4=0.045, L5=0.03, L6=0.012, bend=0.3, tilt=0.2)
 COAXIAL = FiveBar(L1=0.04, L2=0.06, L3=0.06, L4=0.04, L5=0)
-METRICS = {
-    "tracking": {"rms": 1.23456789e-4, "max": 3e-4},
-    "closure": {"rms": 1e-7, "max": 3e-6},
-    "load": {"share_A": None},
-    "branch": {"working_mode": [-1, 1], "flips": 0},
-    "guards": [],
+METRICS: dict[str, float | None] = {
+    "tracking.rms": 1.23456789e-4,
+    "tracking.max": 3e-4,
+    "closure.rms": 1e-7,
+    "closure.max": 3e-6,
+    "load.share_A": None,
+    "branch.flips": 0,
     "warnings": 0,
-    "verdict": "fail",
-    "provenance": {"versions": {"mujoco": "3.17"}, "seed": 0},
 }
+MEASURED = judged(METRICS, verdict="fail", provenance={"mujoco": "3.17", "seed": 0})
 
 Record = dict[str, Array]
 Columns = dict[str, list[Any]]
@@ -59,13 +61,13 @@ class Drawn(NamedTuple):
 
     scenario: Scenario
     record: Record
-    metrics: dict[str, Any]
+    measured: Judged
 
 
 def drawn(leg: FiveBar, record: Record, source: str = "classic-ellipse", **changes: Any) -> Drawn:
     """Return a run of a leg: a shipped scenario with changes, and the record that it had."""
     changes = {"name": "round and round", "leg": leg, **changes}
-    return Drawn(msgspec.structs.replace(Scenario.load(source), **changes), record, METRICS)
+    return Drawn(msgspec.structs.replace(Scenario.load(source), **changes), record, MEASURED)
 
 
 def written(path: Path, leg: FiveBar, record: Record) -> Path:

@@ -211,19 +211,19 @@ def test_metrics_of_known_steps() -> None:
     z = np.linspace(0.2, 0.1, 10) + LEG.foot_radius
     record = a_record(foot_x=x, foot_z=z, ground_x=force_x, ground_z=4.0 * down)
     measured = ground.measure(LEG, record, slice(3, 9))
-    assert measured["force_max"] == {"x": 3.0, "z": 4.0}
-    assert measured["stance_share"] == pytest.approx(3 / 6)
-    assert measured["slip"] == pytest.approx(2.0 + 1.0 + 2.0)
-    assert measured["flight_max"] == pytest.approx(3 * H)
-    assert measured["foot_height_max"] == pytest.approx(0.2)
+    assert (measured.force_max.x, measured.force_max.z) == (3.0, 4.0)
+    assert measured.stance_share == pytest.approx(3 / 6)
+    assert measured.slip == pytest.approx(2.0 + 1.0 + 2.0)
+    assert measured.flight_max == pytest.approx(3 * H)
+    assert measured.foot_height_max == pytest.approx(0.2)
 
 
 def test_leg_that_never_lands_or_never_leaves() -> None:
     air = ground.measure(LEG, a_record(foot_z=np.ones(5)), slice(0, 5))
-    assert (air["stance_share"], air["slip"], air["force_max"]["z"]) == (0.0, 0.0, 0.0)
-    assert air["flight_max"] == pytest.approx(5 * H)
+    assert (air.stance_share, air.slip, air.force_max.z) == (0.0, 0.0, 0.0)
+    assert air.flight_max == pytest.approx(5 * H)
     stands = ground.measure(LEG, a_record(ground_z=np.ones(5)), slice(0, 5))
-    assert (stands["stance_share"], stands["flight_max"]) == (1.0, 0.0)
+    assert (stands.stance_share, stands.flight_max) == (1.0, 0.0)
 
 
 def test_next_to_no_friction_gives_next_to_no_force() -> None:

@@ -81,9 +81,7 @@ def ran(name: str, *settings: str) -> Result:
 
 
 def tripped(result: Result) -> dict[str, Guard]:
-    fields = Guard._fields
-    each = [Guard(**{key: row[key] for key in fields}) for row in result.metrics["guards"]]
-    return {guard.name: guard for guard in each if not guard.ok}
+    return {guard.name: guard for guard in result.measured.guards if not guard.ok}
 
 
 # runs that are none

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
+import msgspec
 import numpy as np
 import pytest
 
@@ -12,7 +13,7 @@ from fivebar_sim import kinematics, metrics
 from fivebar_sim.arrays import Array, Bools
 from fivebar_sim.errors import ArgumentError
 from fivebar_sim.geometry import FiveBar
-from fivebar_sim.metrics import energy, ground, guards, load
+from fivebar_sim.metrics import branch, energy, ground, guards, load
 from fivebar_sim.paths import Gait
 from fivebar_sim.scenario import Scenario
 from fivebar_sim.simulation import measure
@@ -70,7 +71,7 @@ def besides(record: dict[str, Array], saturated: Bools | None = None) -> measure
 def measured(
     scenario: Scenario, record: dict[str, Array], saturated: Bools | None = None
 ) -> dict[str, Any]:
-    return measure.measure(scenario, record, besides(record, saturated))
+    return measure.measure(scenario, record, besides(record, saturated)).table
 
 
 def motors(record: dict[str, Array], name: str) -> Array:
@@ -145,7 +146,7 @@ def test_ground_says_when_the_foot_stood(rng: np.random.Generator) -> None:
     for scenario in (STEPS, ELLIPSE):
         found = measured(scenario, record)
         window = scenario.window
-        assert found["ground"] == ground.measure(scenario.leg, record, window)
+        assert found["ground"] == msgspec.to_builtins(ground.measure(scenario.leg, record, window))
         torque = motors(record, "torque")[window][down[window]]
         rms = np.sqrt(np.mean(torque**2, axis=0))
         for motor, value in zip("AE", rms.tolist(), strict=True):
@@ -167,12 +168,19 @@ def test_energy_and_guards_are_those_of_the_whole_run(rng: np.random.Generator, 
     found = measured(scenario, record, saturated)
     more = besides(record, saturated)
     works = energy.balance(energy.Body(LEG, *mine), record, more.steps)
-    assert found["energy"] == energy.measure(works)
+    assert found["energy"] == msgspec.to_builtins(energy.measure(works))
     checked = guards.Checked(
-        scenario.guards, LEG, record, found["branch"], saturated, works, more.unsolved, command=1
+        scenario.guards,
+        LEG,
+        record,
+        branch.measure(LEG, record),
+        saturated,
+        works,
+        more.unsolved,
+        command=1,
     )
     judged = guards.judge(checked)
-    assert [{**guard._asdict(), "ok": guard.ok} for guard in judged] == found["guards"]
+    assert msgspec.to_builtins(judged) == found["guards"]
     passed = {guard["name"]: guard["ok"] for guard in found["guards"]}
     assert passed["branch"]
     assert not any(passed[name] for name in ("loop", "torque", "energy", "solver"))

@@ -2,43 +2,36 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
+from judged import PROVENANCE, judged
 
 from fivebar_sim import metrics
 from fivebar_sim.metrics.catalogue import ABSOLUTE, LESS_IS_BETTER, SHOWN
+from fivebar_sim.metrics.guards import Guard
 from fivebar_sim.regression import baseline, comparison
 from fivebar_sim.regression.baseline import RELATIVE, Baseline, Recorded
 from fivebar_sim.rollout import Result
 from fivebar_sim.scenario import Scenario
 
-PROVENANCE = {
-    "mujoco": "3.17.0",
-    "platform": "Linux x86_64",
-    "integrator": "discrete",
-    "timestep": 0.001,
-    "seed": 0,
-}
 SCENARIO = Scenario.load("rail-hop")
 KEYS = sorted(ABSOLUTE)
 
 
-def result(values: dict[str, float | None], limits: dict[str, Any] | None = None) -> Result:
+def result(
+    values: dict[str, float | None],
+    limits: dict[str, Any] | None = None,
+    *,
+    guards: Sequence[Guard] = (),
+    provenance: Mapping[str, Any] = PROVENANCE,
+) -> Result:
     """Return a result with some metrics."""
-    measured: dict[str, Any] = {"guards": []}
-    for key, value in values.items():
-        *parents, last = key.split(".")
-        table = measured
-        for part in parents:
-            table = table.setdefault(part, {})
-        table[last] = value
-    judged = metrics.judge(measured, limits or {})
-    measured["verdict"] = "pass" if all(limit.ok for limit in judged) else "fail"
-    measured["provenance"] = PROVENANCE
-    return Result(SCENARIO, {}, measured, judged)
+    measured = judged(values, guards=guards, provenance=provenance)
+    return Result(SCENARIO, {}, measured, metrics.judge(measured.table, limits or {}))
 
 
 def recorded(values: dict[str, float | None], relative: float = RELATIVE) -> Baseline:
@@ -118,15 +111,12 @@ def test_rows_come_in_the_order_of_every_table() -> None:
 
 
 def test_tripped_guards_are_failures() -> None:
-    good = result({"tracking.rms": 1e-3})
     passed = [
-        {"name": "branch", "value": 1.0, "high": 0.0, "time": 0.25, "ok": False},
-        {"name": "loop", "value": 1e-3, "high": 2e-3, "time": None, "ok": True},
-        {"name": "torque", "value": 0.7, "high": 0.5, "time": 0.6, "ok": False},
+        Guard(name="branch", value=1.0, high=0.0, time=0.25, ok=False),
+        Guard(name="loop", value=1e-3, high=2e-3, time=None, ok=True),
+        Guard(name="torque", value=0.7, high=0.5, time=0.6, ok=False),
     ]
-    checked = comparison.compare(
-        good._replace(metrics=good.metrics | {"verdict": "fail", "guards": passed}), None
-    )
+    checked = comparison.compare(result({"tracking.rms": 1e-3}, guards=passed), None)
     assert checked.failures == [
         "guard branch: the leg left its branch at t = 0.25 s; guard torque: a motor's torque had "
         "been clipped for more than 50 % of a second at t = 0.6 s, for 70 % at worst"
@@ -135,11 +125,12 @@ def test_tripped_guards_are_failures() -> None:
 
 def test_failures_say_how_far_and_remarks_what_else() -> None:
     then = recorded({"tracking.rms": 1e-3, "closure.max": 2e-6})
-    here = result({"tracking.rms": 1.1e-3, "closure.max": 1e-6})
+    measured: dict[str, float | None] = {"tracking.rms": 1.1e-3, "closure.max": 1e-6}
+    here = result(measured)
     checked = comparison.compare(here, then)
     assert checked.failures == ["tracking RMS: 1.1 mm, baseline 1 mm (+10.0 %; 5.001 um allowed)"]
     assert checked.remarks == ["better than its baseline: loop gap max; --update records it"]
-    here.metrics["provenance"] = PROVENANCE | {"mujoco": "3.18.0"}
+    here = result(measured, provenance=PROVENANCE | {"mujoco": "3.18.0"})
     note = "its baseline was made with mujoco 3.17.0, now 3.18.0"
     assert comparison.compare(here, then).notes == [note]
     assert "no baseline" in comparison.compare(here, None).notes[0]

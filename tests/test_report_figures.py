@@ -7,9 +7,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from judged import judged
 from msgspec.structs import replace
 
-from fivebar_sim import metrics, rollout
+from fivebar_sim import rollout
 from fivebar_sim.report import comparison, in_plane, look, numbers, over_time
 from fivebar_sim.runs.stored import StoredRun
 from fivebar_sim.scenario import Scenario
@@ -18,7 +19,7 @@ from fivebar_sim.scenario import Scenario
 def stored(name: str, *settings: str) -> StoredRun:
     """Return a run as if it was read back."""
     result = rollout.run(Scenario.load(name, settings))
-    return StoredRun(Path(name), result.scenario, result.record, result.metrics)
+    return StoredRun(Path(name), result.scenario, result.record, result.measured)
 
 
 @pytest.fixture(scope="module")
@@ -153,12 +154,7 @@ def test_difference(
     ellipse: StoredRun, key: str, first: float | None, value: float | None, said: str
 ) -> None:
     def valued(number: float | None) -> StoredRun:
-        table: object = number
-        for part in reversed(key.split(".")):
-            table = {part: table}
-        assert isinstance(table, dict)
-        assert metrics.look_up(table, key) == number
-        return ellipse._replace(metrics=table)
+        return ellipse._replace(measured=judged({key: number}))
 
     assert comparison.difference(key, valued(value), valued(first)) == said
 

@@ -42,8 +42,8 @@ def print_result(result: Result, where: str, console: Console) -> None:
         table.add_row(label, shown(key, look_up(result.metrics, key)), *judged)
 
     console.print(table)
-    for message in guards.tripped(result.metrics["guards"]):
-        console.print(f"[red]{message}[/red]", soft_wrap=True)
+    for said in guards.tripped(result.measured.guards):
+        console.print(f"[red]{said}[/red]", soft_wrap=True)
 
     console.print(
         f"verdict: {verdict(result.verdict == 'pass')}   written to {escape(where)}", soft_wrap=True

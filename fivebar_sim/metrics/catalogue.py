@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from fivebar_sim.arrays import Array
 from fivebar_sim.geometry import FiveBar
@@ -184,7 +184,9 @@ def shown(key: str, value: float | None) -> str:
     return f"{number:.4g} {unit}".strip()
 
 
-def measure(leg: FiveBar, record: Mapping[str, Array], window: slice) -> dict[str, Any]:
+def measure(
+    leg: FiveBar, record: Mapping[str, Array], window: slice
+) -> dict[str, dict[str, float | None]]:
     """Return the metrics that have a function, in tables by the first part of their keys.
 
     Those of the ground are left out of a run without one.
@@ -194,7 +196,7 @@ def measure(leg: FiveBar, record: Mapping[str, Array], window: slice) -> dict[st
         record: The columns of rollout.parquet.
         window: The rows that tracking and load are measured over.
     """
-    tables: dict[str, Any] = {}
+    tables: dict[str, dict[str, float | None]] = {}
     for metric in MEASURED:
         if metric.key in GROUND_KEYS and "ground_z" not in record:
             continue

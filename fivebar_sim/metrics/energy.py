@@ -14,7 +14,7 @@ torques, masses or constraints that are not those that acted.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -25,6 +25,7 @@ from fivebar_sim.geometry import FiveBar
 from fivebar_sim.kinematics.planar import end_velocity
 from fivebar_sim.metrics.columns import JOINTS, motors
 from fivebar_sim.metrics.ground import contact_radius
+from fivebar_sim.metrics.json_types import Amount, Number, Table
 
 TINY = 1e-9
 """Turned over, this [J] is nothing: the imbalance of a leg that only stands says nothing."""
@@ -105,6 +106,20 @@ class Balance(NamedTuple):
         if not self.turnover > TINY:
             return None
         return float(np.abs(self.unaccounted).max()) / self.turnover
+
+
+class Energy(Table, frozen=True):
+    """The table "energy" of metrics.json: what the columns of `Balance` add up to [J]."""
+
+    motor: Number
+    force: Number
+    ground: Number
+    constraints: Number
+    step: Number
+    kinetic: Number
+    potential: Number
+    turnover: Amount
+    imbalance: Amount
 
 
 class _Motion(NamedTuple):
@@ -244,16 +259,13 @@ def foot_rates(leg: FiveBar, q: Array, v: Array) -> Array:
     return end_velocity(AB, BF, v[..., 0], v[..., 0] + v[..., 1])
 
 
-def measure(found: Balance) -> dict[str, Any]:
+def measure(found: Balance) -> Energy:
     """Return the metrics of the energy, over the whole run.
 
     The net works and gains of `Balance` [J], and its turnover and imbalance.
     """
-    return {
-        **{name: float(work.sum()) for name, work in found._asdict().items()},
-        "turnover": found.turnover,
-        "imbalance": found.imbalance,
-    }
+    net = {name: float(work.sum()) for name, work in found._asdict().items()}
+    return Energy(**net, turnover=found.turnover, imbalance=found.imbalance)
 
 
 def _open_pose(q: Array) -> Pose:

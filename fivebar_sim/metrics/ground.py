@@ -3,12 +3,29 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 
 from fivebar_sim.arrays import Array, Bools
 from fivebar_sim.geometry import FiveBar
+from fivebar_sim.metrics.json_types import Amount, Number, Part, Table
+
+
+class Force(Table, frozen=True):
+    """Largest forces of the ground on the foot [N]."""
+
+    x: Number
+    z: Number
+
+
+class Ground(Table, frozen=True):
+    """The table "ground" of metrics.json; see `measure`."""
+
+    force_max: Force
+    stance_share: Part
+    slip: Amount
+    foot_height_max: Number
+    flight_max: Amount
 
 
 def stands(record: Mapping[str, Array]) -> Bools:
@@ -47,7 +64,7 @@ def slid(leg: FiveBar, record: Mapping[str, Array]) -> Array:
     return np.diff(record["foot_x"] - belt) + 0.5 * (r[1:] + r[:-1]) * np.diff(psi_2)
 
 
-def measure(leg: FiveBar, record: Mapping[str, Array], window: slice) -> dict[str, Any]:
+def measure(leg: FiveBar, record: Mapping[str, Array], window: slice) -> Ground:
     """Return the metrics of the ground.
 
     force_max, foot_height_max and flight_max (the longest time without force, that of a drop
@@ -63,16 +80,16 @@ def measure(leg: FiveBar, record: Mapping[str, Array], window: slice) -> dict[st
     h = float(record["time"][0])
     slip = np.concatenate([[0.0], np.abs(slid(leg, record)) * down[1:]])[window]
 
-    return {
-        "force_max": {
-            "x": float(np.abs(record["ground_x"]).max()),
-            "z": float(record["ground_z"].max()),
-        },
-        "stance_share": float(down[window].mean()),
-        "slip": float(slip.sum()),
-        "foot_height_max": float(height(leg, record).max()),
-        "flight_max": h * _longest(~down),
-    }
+    return Ground(
+        force_max=Force(
+            x=float(np.abs(record["ground_x"]).max()),
+            z=float(record["ground_z"].max()),
+        ),
+        stance_share=float(down[window].mean()),
+        slip=float(slip.sum()),
+        foot_height_max=float(height(leg, record).max()),
+        flight_max=h * _longest(~down),
+    )
 
 
 def _longest(chosen: Bools) -> int:

@@ -8,17 +8,20 @@ solver converges is not up to it.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from typing import Any, NamedTuple
+from collections.abc import Callable, Mapping, Sequence
+from typing import Annotated, NamedTuple
 
 import msgspec
 import numpy as np
 
 from fivebar_sim.arrays import Array, Bools
 from fivebar_sim.checks import check_number
+from fivebar_sim.errors import unknown
 from fivebar_sim.geometry import FiveBar
 from fivebar_sim.metrics import ground
+from fivebar_sim.metrics.branch import Branch
 from fivebar_sim.metrics.energy import Balance
+from fivebar_sim.metrics.json_types import LARGEST, Amount, Number, Table
 from fivebar_sim.metrics.lasting import chattering, clipped
 
 
@@ -54,7 +57,7 @@ class Guards(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
             check_number(part, getattr(self, part), "", low=0.0)
 
 
-class Guard(NamedTuple):
+class Guard(Table, frozen=True):
     """One guard and what came of it.
 
     Attributes:
@@ -62,17 +65,20 @@ class Guard(NamedTuple):
         value: What was found, in SI units; None where there is nothing to find.
         high: Greatest value that is fine.
         time: When it tripped, the first step above `high` [s]; None if it never did.
+        ok: Whether it held.
     """
 
     name: str
-    value: float | None
-    high: float
-    time: float | None
+    value: Number
+    high: Annotated[float, msgspec.Meta(ge=0, le=LARGEST)]
+    time: Amount
+    ok: bool
 
-    @property
-    def ok(self) -> bool:
-        """Whether it held."""
-        return self.time is None
+    def __post_init__(self) -> None:
+        if self.name not in ROWS:
+            raise ValueError(unknown("guard", self.name, ROWS))
+        if self.ok != (self.time is None):
+            raise ValueError(f"ok must be {str(not self.ok).lower()} with time {self.time}")
 
     def __str__(self) -> str:
         """Return what it says where it tripped: the bound, when, and the worst of the run."""
@@ -89,7 +95,7 @@ class Checked(NamedTuple):
         bounds: Of the scenario.
         leg: The leg.
         record: The columns of rollout.parquet.
-        branch: The metrics of that name.
+        branch: Branch of the last step, and when it flipped.
         saturated: Whether the torque limit clipped A and E in each step, (N, 2).
         balance: The work of each step.
         unsolved: Whether the constraint solver ran out of iterations in each step, (N,).
@@ -99,7 +105,7 @@ class Checked(NamedTuple):
     bounds: Guards
     leg: FiveBar
     record: Mapping[str, Array]
-    branch: Mapping[str, Any]
+    branch: Branch
     saturated: Bools
     balance: Balance
     unsolved: Bools
@@ -141,17 +147,20 @@ class Row(NamedTuple):
 def judge(run: Checked) -> list[Guard]:
     """Return every guard of a run."""
     found = [(row.name, row.function(run)) for row in GUARDS]
-    return [Guard(name, *each) for name, each in found if each is not None]
+    return [
+        Guard(name=name, **each._asdict(), ok=each.time is None)
+        for name, each in found
+        if each is not None
+    ]
 
 
-def tripped(guards: list[Mapping[str, Any]]) -> list[str]:
-    """Return what the guards that tripped say, from the metrics of that name."""
-    known = (Guard(**{key: each[key] for key in Guard._fields}) for each in guards)
-    return [str(guard) for guard in known if not guard.ok]
+def tripped(guards: Sequence[Guard]) -> list[str]:
+    """Return the messages of the guards that tripped."""
+    return [str(guard) for guard in guards if not guard.ok]
 
 
 def _left_branch(run: Checked) -> Found:
-    return Found(float(run.branch["flips"]), 0.0, run.branch["first_flip"])
+    return Found(float(run.branch.flips), 0.0, run.branch.first_flip)
 
 
 def _open_loop(run: Checked) -> Found:

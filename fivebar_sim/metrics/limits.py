@@ -6,7 +6,9 @@ import math
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
-from fivebar_sim.metrics.catalogue import shown
+from fivebar_sim.errors import unknown
+from fivebar_sim.metrics.catalogue import LIMIT_KEYS, shown
+from fivebar_sim.metrics.json_types import Number, Table
 
 
 class Limit(NamedTuple):
@@ -17,6 +19,26 @@ class Limit(NamedTuple):
     high: float
     value: float | None
     ok: bool
+
+
+class WrittenLimit(Table, frozen=True):
+    """A limit as metrics.json has it: `low` is None where there is only an upper bound."""
+
+    key: str
+    low: Number
+    high: Number
+    value: Number
+    ok: bool
+
+    def __post_init__(self) -> None:
+        if self.key not in LIMIT_KEYS:
+            raise ValueError(unknown("metric", self.key, LIMIT_KEYS))
+
+    @classmethod
+    def of(cls, limit: Limit) -> WrittenLimit:
+        """Return a limit as it is written: JSON has no word for -inf."""
+        low = None if limit.low == -math.inf else limit.low
+        return cls(key=limit.key, low=low, high=limit.high, value=limit.value, ok=limit.ok)
 
 
 def look_up(metrics: Mapping[str, Any], key: str) -> float | None:

@@ -8,17 +8,18 @@ from __future__ import annotations
 import json
 import os
 import threading
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
 from fivebar_sim.arrays import Array
 from fivebar_sim.errors import FiveBarError
 from fivebar_sim.metrics.columns import Record
+from fivebar_sim.metrics.measured import Judged
 from fivebar_sim.recording import foot, ground, layout
 from fivebar_sim.recording import leg as scene
 from fivebar_sim.recording.look import Look, looks
@@ -53,8 +54,8 @@ class Run(Protocol):
         ...
 
     @property
-    def metrics(self) -> Mapping[str, Any]:
-        """The contents of metrics.json."""
+    def measured(self) -> Judged:
+        """All of metrics.json, with types."""
         ...
 
 
@@ -135,7 +136,7 @@ def _send(stream: rr.RecordingStream, runs: Sequence[Run], names: list[str]) -> 
     moved = [motion(run.record, drawn_rows(run.record["time"])) for run in runs]
     plots = [list(series(run.scenario, run.record)) for run in runs]
     room = stage([run.scenario.leg for run in runs], moved)
-    text = summary(names, [run.metrics for run in runs], [run.scenario.limits for run in runs])
+    text = summary(names, [run.measured for run in runs], [run.scenario.limits for run in runs])
     layout.send(stream, layout.contents(room, shown, plots))
     stream.log(layout.SUMMARY, rr.TextDocument(text, media_type="text/markdown"), static=True)
     log_room(stream, room)

@@ -8,39 +8,37 @@ from typing import Any
 from fivebar_sim.metrics import guards
 from fivebar_sim.metrics.catalogue import SHOWN, shown
 from fivebar_sim.metrics.limits import Limit, bounds, judge, look_up
+from fivebar_sim.metrics.measured import Judged
 
 
 def summary(
     labels: Sequence[str],
-    metrics: Sequence[Mapping[str, Any]],
+    found: Sequence[Judged],
     limits: Sequence[Mapping[str, tuple[float, float]]],
 ) -> str:
     """Return Markdown: verdict, tripped guards and limits of every run; then the metrics.
 
     Args:
-        labels: Name of each run.
-        metrics: Contents of each run's metrics.json.
-        limits: Limits (low, high) of each run by the metric's dotted key.
+        labels: What each run is called.
+        found: What was measured and judged of each.
+        limits: (low, high) of each by the metric's dotted key.
     """
     lines: list[str] = []
-    for label, measured, own in zip(labels, metrics, limits, strict=True):
-        lines += [f"## {_cell(label)}: {measured['verdict'].upper()}", ""]
-        tripped = [f"- {line}" for line in guards.tripped(measured.get("guards", []))]
+    for label, measured, own in zip(labels, found, limits, strict=True):
+        lines += [f"## {_cell(label)}: {measured.verdict.upper()}", ""]
+        tripped = [f"- {said}" for said in guards.tripped(measured.guards)]
         lines += [*tripped, ""] if tripped else []
-        lines += [*_limits(_judge_all(measured, own)), ""]
+        lines += [*_limits(_judged(measured.table, own)), ""]
 
     names = [_cell(label) for label in labels] if len(labels) > 1 else ["value"]
     lines += [f"| metric | {' | '.join(names)} |", f"|:--|{'--:|' * len(names)}"]
     for key, (name, _, _) in SHOWN.items():
-        values = [_value(measured, key) for measured in metrics]
-        # A metric that no run has, as a ground's in the air, gets no row.
+        values = [_value(measured.table, key) for measured in found]
         if any(values):
             lines.append(f"| {name} | {' | '.join(values)} |")
 
-    for label, measured in zip(labels, metrics, strict=True):
-        facts = ", ".join(
-            f"{key} {_cell(value)}" for key, value in _flat(measured.get("provenance", {}))
-        )
+    for label, measured in zip(labels, found, strict=True):
+        facts = ", ".join(f"{key} {_cell(value)}" for key, value in measured.provenance.items())
         lines += ["", f"*{_cell(label)}: {facts}*"]
     return "\n".join(lines) + "\n"
 
@@ -77,15 +75,6 @@ def _value(measured: Mapping[str, Any], key: str) -> str:
         return shown(key, look_up(measured, key))
     except KeyError:
         return ""
-
-
-def _flat(table: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
-    """Yield the values of nested tables by dotted keys."""
-    for key, value in table.items():
-        if isinstance(value, Mapping):
-            yield from _flat(value, f"{prefix}{key}.")
-        else:
-            yield f"{prefix}{key}", value
 
 
 def _cell(value: Any) -> str:

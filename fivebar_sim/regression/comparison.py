@@ -98,7 +98,7 @@ def accept(checked: Checked) -> Checked:
 
 def _broke(result: Result) -> str:
     """Return why a run failed, if not by its limits."""
-    return "; ".join(guards.tripped(result.metrics["guards"]))
+    return "; ".join(guards.tripped(result.measured.guards))
 
 
 def _notes(baseline: Baseline | None, metrics: Mapping[str, Any]) -> Iterator[str]:

@@ -102,7 +102,7 @@ class LegRun:
         if high is not None:
             check_number("high", high, "", low=-inf if low is None else low)
 
-        tripped = guards.tripped(self.metrics["guards"])
+        tripped = guards.tripped(self.result.measured.guards)
         if tripped:
             raise AssertionError("\n  ".join([f"{self.scenario.name} fails:", *tripped]))
 

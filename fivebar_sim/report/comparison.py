@@ -205,7 +205,7 @@ GROUND = (
 
 def _tripped(run: StoredRun) -> Cell:
     """Return the names of the guards that tripped."""
-    return text(", ".join(each["name"] for each in run.metrics["guards"] if not each["ok"]))
+    return text(", ".join(each.name for each in run.measured.guards if not each.ok))
 
 
 def _metrics(runs: Sequence[StoredRun]) -> str:
@@ -216,7 +216,7 @@ def _metrics(runs: Sequence[StoredRun]) -> str:
         head.append(Cell(f'<span class="swatch" style="background: {tint}"></span>{text(name)}'))
 
     rows: list[list[object]] = [
-        ["verdict", *(html.verdict(run.metrics["verdict"] == "pass") for run in runs)],
+        ["verdict", *(html.judged(run.measured.verdict == "pass") for run in runs)],
         ["guards that tripped", *(_tripped(run) for run in runs)],
     ]
     limits = [{limit.key: limit for limit in numbers.limits(run)} for run in runs]

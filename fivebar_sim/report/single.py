@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import shlex
 
+import msgspec
 import tomli_w
 
 from fivebar_sim.checks import is_finite
-from fivebar_sim.files import tables
 from fivebar_sim.metrics import guards
 from fivebar_sim.metrics.catalogue import SHOWN, shown
 from fivebar_sim.metrics.limits import bounds, look_up
@@ -43,16 +43,15 @@ def page(run: StoredRun, drawn: list[Drawn]) -> str:
         html.section("All metrics", _metrics(run)),
         html.section("What was run", *_what(run)),
     ]
-    return html.page(f"{scenario.name}: {run.metrics['verdict']}", parts)
+    return html.page(f"{scenario.name}: {run.measured.verdict}", parts)
 
 
 def _head(run: StoredRun) -> str:
     """Return the heading: name, verdict, and a sentence about the run."""
     scenario = run.scenario
-    metrics = run.metrics
     window = scenario.window
     h = scenario.sim.timestep
-    good = metrics["verdict"] == "pass"
+    good = run.measured.verdict == "pass"
     about = (
         f"The leg {scenario.leg.name} follows a path of kind {scenario.path.__struct_config__.tag} "
         f"in the scene {scenario.scene.kind}, driven by the controller "
@@ -60,7 +59,7 @@ def _head(run: StoredRun) -> str:
         f"Tracking and load are measured from {window.start * h:.4g} s to {window.stop * h:.4g} s, "
         f"the loop gap over the whole run."
     )
-    tripped = [f'<p class="fail">{text(line)}</p>' for line in guards.tripped(metrics["guards"])]
+    tripped = [f'<p class="fail">{text(said)}</p>' for said in guards.tripped(run.measured.guards)]
     word = "pass" if good else "fail"
 
     return "\n".join(
@@ -79,11 +78,11 @@ def _limits(run: StoredRun) -> str:
         (SHOWN[limit.key][0], bounds(limit), shown(limit.key, limit.value), html.verdict(limit.ok))
         for limit in numbers.limits(run)
     ]
-    for guard in run.metrics["guards"]:
-        row = guards.ROWS[guard["name"]]
-        allowed = f"<= {row.show(guard['high'])}"
-        value = row.show(guard["value"])
-        rows.append((f"guard {row.name}", allowed, value, html.verdict(guard["ok"])))
+    for guard in run.measured.guards:
+        row = guards.ROWS[guard.name]
+        allowed = f"<= {row.show(guard.high)}"
+        value = row.show(guard.value)
+        rows.append((f"guard {row.name}", allowed, value, html.judged(guard.ok)))
     return html.table(
         "The run passes if all of these hold.", ("metric", "limit", "value", ""), rows
     )
@@ -127,18 +126,18 @@ def _load(run: StoredRun) -> str:
 
 
 def _phase(run: StoredRun) -> list[str]:
-    """Return the table of the load over the gait's cycle, if the path has one."""
-    phase = run.metrics["load"].get("phase")
-    if phase is None:
+    """Return the load over the gait's cycle, if the path has one."""
+    phase = run.measured.load.phase
+    if phase is msgspec.UNSET:
         return []
 
-    share = phase["share_A"]
-    rms = phase["torque_rms"]
+    share = phase.share_A
+    rms = phase.torque_rms
     rows = [
         (
             f"{100.0 * k / len(share):.4g} to {100.0 * (k + 1) / len(share):.4g} %",
-            shown("load.torque_rms.A", rms["A"][k]),
-            shown("load.torque_rms.E", rms["E"][k]),
+            shown("load.torque_rms.A", rms.A[k]),
+            shown("load.torque_rms.E", rms.E[k]),
             shown("load.share_A", part),
         )
         for k, part in enumerate(share)
@@ -174,7 +173,7 @@ def _what(run: StoredRun) -> list[str]:
     """Return the command, the provenance of the numbers, and the resolved scenario."""
     # Quoted for a shell: a run directory may have blanks in its name.
     again = shlex.join(["fivebar", "run", f"{numbers.name_of(run)}/scenario.toml"])
-    rows = [(key, plain(value)) for key, value in tables.flat(run.metrics["provenance"])]
+    rows = [(key, plain(value)) for key, value in run.measured.provenance.items()]
     return [
         "<p>To run it again, in the folder that contains the run directory:</p>",
         f"<pre><code>{html.escape(again)}</code></pre>",

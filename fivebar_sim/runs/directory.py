@@ -101,7 +101,7 @@ def _fill(stage: Path, result: rrd.Run) -> None:
     (stage / "scenario.toml").write_text(tomli_w.dumps(scenario.table()), encoding="utf-8")
     for name, source in scenario.files.items():
         shutil.copyfile(source, stage / name)
-    text = json.dumps(result.metrics, indent=2, allow_nan=False)
+    text = json.dumps(result.measured.table, indent=2, allow_nan=False)
     (stage / "metrics.json").write_text(text + "\n", encoding="utf-8")
     write_record(stage / "rollout.parquet", result.record)
     rrd.write(stage / "recording.rrd", [result])

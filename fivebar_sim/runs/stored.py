@@ -11,6 +11,7 @@ from fivebar_sim.errors import FiveBarError, RunDirectoryError
 from fivebar_sim.kinematics.stops import SPEED_LIMIT
 from fivebar_sim.metrics import load
 from fivebar_sim.metrics.columns import JOINT_COLUMNS, Record
+from fivebar_sim.metrics.measured import Judged
 from fivebar_sim.runs import directory, stored_metrics
 from fivebar_sim.scenario import Scenario
 from fivebar_sim.scenario.scenes import Ground, Treadmill
@@ -40,13 +41,18 @@ class StoredRun(NamedTuple):
         path: The directory.
         scenario: What was run.
         record: The columns of rollout.parquet, each (N,), SI.
-        metrics: What metrics.json says.
+        measured: All of metrics.json, with types.
     """
 
     path: Path
     scenario: Scenario
     record: Record
-    metrics: dict[str, Any]
+    measured: Judged
+
+    @property
+    def metrics(self) -> dict[str, Any]:
+        """What metrics.json says: `measured` as nested dictionaries."""
+        return self.measured.table
 
 
 def read(path: Path) -> StoredRun:
@@ -81,9 +87,9 @@ def read(path: Path) -> StoredRun:
 
     _check_plausible(path / "rollout.parquet", record, scenario.sim.timestep)
     grounded = isinstance(scenario.scene, Ground)
-    metrics = stored_metrics.read(path / "metrics.json", grounded=grounded)
+    measured = stored_metrics.read(path / "metrics.json", grounded=grounded)
 
-    return StoredRun(path, scenario, record, metrics)
+    return StoredRun(path, scenario, record, measured)
 
 
 def _check_plausible(file: Path, record: Record, timestep: float) -> None:

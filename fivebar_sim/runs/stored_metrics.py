@@ -11,10 +11,11 @@ import msgspec
 
 from fivebar_sim.errors import RunDirectoryError
 from fivebar_sim.files import input_file, tables
-from fivebar_sim.runs.metrics_types import Metrics
+from fivebar_sim.metrics import measured
+from fivebar_sim.metrics.measured import Judged
 
 
-def read(file: Path, *, grounded: bool) -> dict[str, Any]:
+def read(file: Path, *, grounded: bool) -> Judged:
     """Return what metrics.json says, found to be what a run says.
 
     Args:
@@ -37,14 +38,14 @@ def read(file: Path, *, grounded: bool) -> dict[str, Any]:
         raise RunDirectoryError(f"{file} is not of a run: nested too deep")
 
     try:
-        msgspec.convert(metrics, Metrics)
+        found = measured.read(metrics)
     except msgspec.ValidationError as error:
         raise RunDirectoryError(f"{file}: {_explain(str(error), metrics)}") from None
 
-    if grounded != ("ground" in metrics):
+    if grounded == (found.ground is msgspec.UNSET):
         which = "lacks" if grounded else "must not have"
         raise RunDirectoryError(f"{file}: a run of this scene {which} the key ground")
-    return metrics
+    return found
 
 
 def _explain(message: str, metrics: Any) -> str:

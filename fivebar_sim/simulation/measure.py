@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
+import msgspec
 import numpy as np
 
-from fivebar_sim import kinematics
 from fivebar_sim.arrays import Array, Bools
-from fivebar_sim.geometry import FiveBar
-from fivebar_sim.metrics import catalogue, energy, ground, guards, load
-from fivebar_sim.metrics.columns import JOINT_COLUMNS, MOTORS, motors
+from fivebar_sim.metrics import branch, catalogue, energy, ground, guards, load, measured
+from fivebar_sim.metrics.columns import MOTORS, motors
+from fivebar_sim.metrics.json_types import Parts
+from fivebar_sim.metrics.measured import Measured
+from fivebar_sim.metrics.sharing import Load
 from fivebar_sim.paths import Gait
 
 if TYPE_CHECKING:
@@ -34,7 +36,7 @@ class Unrecorded(NamedTuple):
     warnings: int
 
 
-def measure(scenario: Scenario, record: Mapping[str, Array], besides: Unrecorded) -> dict[str, Any]:
+def measure(scenario: Scenario, record: Mapping[str, Array], besides: Unrecorded) -> Measured:
     """Return the metrics of a run, in SI units.
 
     Tracking, closure and everything else with a function of its own come from `catalogue`; load
@@ -52,40 +54,32 @@ def measure(scenario: Scenario, record: Mapping[str, Array], besides: Unrecorded
     saturated = besides.saturated
     body = energy.Body(leg, scenario.payload, scenario.trunk)
     balance = energy.balance(body, record, besides.steps)
-    branch = _branch(leg, record)
+    folded = branch.measure(leg, record)
     checked = guards.Checked(
         bounds=scenario.guards,
         leg=leg,
         record=record,
-        branch=branch,
+        branch=folded,
         saturated=saturated,
         balance=balance,
         unsolved=besides.unsolved,
         command=scenario.command,
     )
     window = scenario.window
-    tables: dict[str, Any] = {
-        "load": _load(scenario, record, start, saturated),
-        "energy": energy.measure(balance),
-        "branch": branch,
-        "guards": [{**guard._asdict(), "ok": guard.ok} for guard in guards.judge(checked)],
-        "warnings": int(besides.warnings),
-    }
-
-    if "ground_z" in record:
-        tables["ground"] = ground.measure(leg, record, window)
-
-    # Merged, not replaced: a row of the catalogue may add a number to one of these tables.
-    measured = catalogue.measure(leg, record, window)
-    for name, table in tables.items():
-        measured[name] = {**table, **measured[name]} if name in measured else table
-    return measured
+    grounded = "ground_z" in record
+    return measured.of(
+        catalogue.measure(leg, record, window),
+        load=_load(scenario, record, start, saturated),
+        energy=energy.measure(balance),
+        branch=folded,
+        guards=guards.judge(checked),
+        warnings=int(besides.warnings),
+        ground=ground.measure(leg, record, window) if grounded else msgspec.UNSET,
+    )
 
 
-def _load(
-    scenario: Scenario, record: Mapping[str, Array], start: Array, saturated: Bools
-) -> dict[str, Any]:
-    """Return how the motors share the load over the window, and how often they are clipped."""
+def _load(scenario: Scenario, record: Mapping[str, Array], start: Array, saturated: Bools) -> Load:
+    """Return how the motors share the load over the window, and how often they were clipped."""
     window = scenario.window
     path = scenario.path
     h = scenario.sim.timestep
@@ -106,24 +100,8 @@ def _load(
     elif isinstance(path, Gait):
         stance = path.in_stance(begun)
 
-    measured = load.measure(torque[window], turned, h, stance=stance, phase=phase)
+    shared = load.sharing(torque[window], turned, h, stance=stance, phase=phase)
     clipped = saturated[window].mean(axis=0).tolist()
-    return {**measured, "saturated": dict(zip(MOTORS, clipped, strict=True))}
-
-
-def _branch(leg: FiveBar, record: Mapping[str, Array]) -> dict[str, Any]:
-    """Return the branch after the last step, how often it flipped, and when first.
-
-    Every step is compared with the one before, the first step with the leg's own branch.
-    """
-    q = np.stack([record[name] for name in JOINT_COLUMNS], axis=-1)
-    signs = np.stack(kinematics.branch(leg, kinematics.chain_points(leg, q)), axis=-1)
-    own = np.array([*leg.mode, leg.assembly])
-    flipped = np.any(np.diff(signs, axis=0, prepend=own[None]) != 0, axis=-1)
-    s_A, s_E, assembly = signs[-1].tolist()
-    return {
-        "working_mode": [s_A, s_E],
-        "assembly": assembly,
-        "flips": int(flipped.sum()),
-        "first_flip": float(record["time"][np.argmax(flipped)]) if flipped.any() else None,
-    }
+    return Load(
+        **msgspec.structs.asdict(shared), saturated=Parts(**dict(zip(MOTORS, clipped, strict=True)))
+    )

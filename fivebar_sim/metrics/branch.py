@@ -1,0 +1,49 @@
+"""Which way the leg is folded, and whether that changed during a run."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Annotated
+
+import msgspec
+import numpy as np
+
+from fivebar_sim import kinematics
+from fivebar_sim.arrays import Array
+from fivebar_sim.geometry import FiveBar
+from fivebar_sim.metrics.columns import JOINT_COLUMNS
+from fivebar_sim.metrics.json_types import Amount, Count, Sign, Table
+
+
+class Branch(Table, frozen=True):
+    """The branch of a run's last step.
+
+    Attributes:
+        working_mode: (s_A, s_E).
+        assembly: Side of the line B-D that C is on.
+        flips: Steps after which the branch was another one.
+        first_flip: When it first changed [s]; None if it never did.
+    """
+
+    working_mode: Annotated[list[Sign], msgspec.Meta(min_length=2, max_length=2)]
+    assembly: Sign
+    flips: Count
+    first_flip: Amount
+
+
+def measure(leg: FiveBar, record: Mapping[str, Array]) -> Branch:
+    """Return the branch of the last step, how often it flipped, and when first.
+
+    Every step is compared with the one before, the first with the leg's own branch.
+    """
+    q = np.stack([record[name] for name in JOINT_COLUMNS], axis=-1)
+    signs = np.stack(kinematics.branch(leg, kinematics.chain_points(leg, q)), axis=-1)
+    own = np.array([*leg.mode, leg.assembly])
+    flipped = np.any(np.diff(signs, axis=0, prepend=own[None]) != 0, axis=-1)
+    s_A, s_E, assembly = signs[-1].tolist()
+    return Branch(
+        working_mode=[s_A, s_E],
+        assembly=assembly,
+        flips=int(flipped.sum()),
+        first_flip=float(record["time"][np.argmax(flipped)]) if flipped.any() else None,
+    )
