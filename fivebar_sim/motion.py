@@ -91,11 +91,7 @@ def plan(
     wanted = path.at(time)
     # Compared by identity below: only projected targets lose their analytic rates.
     foot = _project(leg, wanted, time) if path.outside == "nearest" else wanted
-    try:
-        kinematics.inverse(leg, foot.position)
-    except UnreachableError as error:
-        raise _out_of_reach(leg, foot.position, time, error) from None
-
+    _check_reach(leg, foot.position, time)
     q, q_dot, q_ddot = kinematics.joint_motion(leg, *foot)
     rest = kinematics.home(leg)
     # Angles come in (-pi, pi]; a motor that goes round must not jump by a turn.
@@ -238,11 +234,23 @@ def _refuse(bad: Bools, foot: Array, time: Array, what: str) -> None:
         raise UnreachableError(f"path {what}: at t = {time[k]:g} s, foot at {_mm(foot[k])}", (k,))
 
 
+def _check_reach(leg: FiveBar, foot: Array, time: Array) -> None:
+    """Raise if a path leaves the workspace, with the nearest reachable point.
+
+    Raises:
+        UnreachableError: The path leaves the workspace; `.index` is the step.
+    """
+    try:
+        kinematics.inverse(leg, foot)
+    except UnreachableError as error:
+        raise _out_of_reach(leg, foot, time, error.index) from None
+
+
 def _out_of_reach(
-    leg: FiveBar, foot: Array, time: Array, error: UnreachableError
+    leg: FiveBar, foot: Array, time: Array, index: tuple[int, ...]
 ) -> UnreachableError:
     """Return the error of a path that leaves the workspace, with the nearest reachable point."""
-    (k,) = error.index
+    (k,) = index
     lost = f"path out of reach at t = {time[k]:g} s: the foot at {_mm(foot[k])}"
     nearest = workspace.nearest(leg, foot[k], mode=leg.mode)
     out = float(np.hypot(*(foot[k] - nearest)))
@@ -250,8 +258,8 @@ def _out_of_reach(
     far = np.hypot(*foot[k]) > 100.0 * leg.size
     hint = "; positions are in metres: were these in mm?" if far else ""
     return UnreachableError(
-        f"{lost} is {1e3 * out:.3g} mm out; the nearest reachable point is {_mm(nearest)}{hint}",
-        error.index,
+        f"{lost} is {1e3 * out:.3g} mm out; the nearest reachable point is {_mm(nearest)}",
+        index,
     )
 
 

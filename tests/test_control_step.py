@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from fivebar_sim.arrays import Array
 from fivebar_sim.control.sensors import Sensors
 from fivebar_sim.control.servo import Drive, Servo
-from fivebar_sim.control.step import ControlStep, whole_steps
+from fivebar_sim.control.step import ControlStep, check_whole_steps, whole_steps
 from fivebar_sim.errors import ArgumentError
 
 H = 1e-3
@@ -218,6 +218,8 @@ def test_refusal_of_a_part_of_a_timestep(seconds: float) -> None:
         ArgumentError, match=r"^period must be a whole number of timesteps of 0.001"
     ):
         whole_steps("period", seconds, H)
+    with pytest.raises(ArgumentError, match="whole number of timesteps"):
+        check_whole_steps("period", seconds, H)
 
 
 @pytest.mark.parametrize("seconds", [0.0, -1.0, float("nan"), float("inf"), True, "1"])

@@ -295,6 +295,9 @@ def test_refusal_of_a_bus_faster_than_the_steps() -> None:
     )
     with pytest.raises(ArgumentError, match=message):
         Servo(rate=2000.5).latched(10, H)
+    with pytest.raises(ArgumentError, match=message):
+        Servo(rate=2000.5).check_rate(H)
+    Servo(rate=1000.0).check_rate(H)
     with pytest.raises(ArgumentError, match="timestep must be in"):
         Servo().latched(10, math.nan)
 

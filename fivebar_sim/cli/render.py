@@ -39,8 +39,8 @@ def render(
     from fivebar_sim.runs import stored
 
     run = stored.read(run_dir)
-    # Before mujoco is imported: that fails where MUJOCO_GL names a GL that is not installed.
-    gl.find()
+    # before mujoco is imported, which fails where MUJOCO_GL names what is not there
+    gl.check_available()
 
     from fivebar_sim.render import film as render
     from fivebar_sim.render.replay import replay

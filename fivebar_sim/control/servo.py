@@ -98,6 +98,22 @@ class Servo(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
         """Return the rate gain that the limit does not clip, the joint's damping [N m s/rad]."""
         return self.kd if _is_kd_passive(self, drive) else self.back_emf
 
+    def check_rate(self, timestep: float) -> None:
+        """Raise if commands come faster than timesteps: no command acts for part of a step.
+
+        Args:
+            timestep: h [s].
+
+        Raises:
+            ArgumentError: Unless 0 < h, and rate <= 1 / h.
+        """
+        check_number("timestep", timestep, "s", low=0.0, strict=True)
+        if self.rate is not None and not self.rate * timestep <= 1.0 + 1e-9:  # rounding of 1 / h
+            raise ArgumentError(
+                f"rate must be in (0, {1.0 / timestep:g}] Hz, at most one command a timestep "
+                f"of {timestep:g} s, got {self.rate!r}"
+            )
+
     def latched(self, steps: int, timestep: float) -> NDArray[np.int64]:
         """Return which row of a table of commands acts in each step, (N,); -1 before the first.
 
@@ -114,18 +130,10 @@ class Servo(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
         Raises:
             ArgumentError: Unless 0 < h, and rate <= 1 / h: no command acts for part of a step.
         """
-        check_number("timestep", timestep, "s", low=0.0, strict=True)
+        self.check_rate(timestep)
         hold = 1
         if self.rate is not None:
-            # Refused, not clipped: else the run would not be what its table says.
-            # 1e-9, since a rate of exactly one command a step may be rounded up.
-            if not self.rate * timestep <= 1.0 + 1e-9:
-                raise ArgumentError(
-                    f"rate must be in (0, {1.0 / timestep:g}] Hz, at most one command a timestep "
-                    f"of {timestep:g} s, got {self.rate!r}"
-                )
-            # Commands per step; a command that outlasts the run would overflow 1 / part.
-            part = self.rate * timestep
+            part = self.rate * timestep  # of a command in one step
             hold = max(1, round(1.0 / part) if part * steps > 1.0 else steps)
 
         late = round(min(self.delay / timestep, steps))
@@ -161,12 +169,8 @@ class ServoArrays:
         Raises:
             ArgumentError: Servos that differ in limit, speed or resolution.
         """
+        check_alike(servos)
         first = servos[0]
-        for name in ("limit", "speed", "resolution"):
-            if any(getattr(servo, name) != getattr(first, name) for servo in servos):
-                raise ArgumentError(f"servos of one group must have the same {name}")
-
-        # (n, 1, 1) broadcasts over (n, steps, motors).
         kp = np.array([[[servo.kp]] for servo in servos])
         kd = np.array([[[servo.kd]] for servo in servos])
         return cls(kp, kd, first.limit, first.speed, first.resolution)
@@ -180,6 +184,18 @@ class ServoArrays:
     def damping(self) -> Array:
         """As in `Servo` [N m s/rad], (n, 1, 1)."""
         return self.kd + self.back_emf
+
+
+def check_alike(servos: Sequence[Servo]) -> None:
+    """Raise if servos of one group differ in more than gains and bus.
+
+    Raises:
+        ArgumentError: They differ in limit, speed or resolution.
+    """
+    first = servos[0]
+    for name in ("limit", "speed", "resolution"):
+        if any(getattr(servo, name) != getattr(first, name) for servo in servos):
+            raise ArgumentError(f"servos of one group must have the same {name}")
 
 
 def read_table(source: str | Path) -> tables.Table:

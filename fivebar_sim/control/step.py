@@ -17,15 +17,15 @@ from fivebar_sim.control.bus import Bus, Steps
 from fivebar_sim.control.interface import Observation
 from fivebar_sim.control.noise import Noise
 from fivebar_sim.control.sensors import Sensors
-from fivebar_sim.control.servo import Drive, Servo, ServoArrays
+from fivebar_sim.control.servo import Drive, Servo, check_alike
 from fivebar_sim.errors import ArgumentError
 
 
-def whole_steps(name: str, seconds: float, timestep: float) -> int:
-    """Return a time as a number of timesteps.
+def check_whole_steps(name: str, seconds: float, timestep: float) -> None:
+    """Raise unless a time is a whole number of timesteps, at least one.
 
     Raises:
-        ArgumentError: The time is not a whole number of timesteps, or shorter than one.
+        ArgumentError: It is not a whole number of timesteps, or below one.
     """
     check_number(name, seconds, "s", low=0.0, strict=True)
     # Over a tiny timestep the quotient can be infinite, which round refuses.
@@ -35,7 +35,16 @@ def whole_steps(name: str, seconds: float, timestep: float) -> int:
         raise ArgumentError(
             f"{name} must be a whole number of timesteps of {timestep:g} s, got {seconds!r} s"
         )
-    return steps
+
+
+def whole_steps(name: str, seconds: float, timestep: float) -> int:
+    """Return a time in whole timesteps.
+
+    Raises:
+        ArgumentError: It is not a whole number of timesteps, or below one.
+    """
+    check_whole_steps(name, seconds, timestep)
+    return round(min(seconds / timestep, LARGEST))
 
 
 class ControlStep:
@@ -71,8 +80,7 @@ class ControlStep:
     ) -> None:
         nsim = len(start)
         servos = [servo] * nsim if isinstance(servo, Servo) else list(servo)
-        # Only for its check: it refuses servos that differ in more than gains and bus.
-        ServoArrays.of(servos)
+        check_alike(servos)
         self.every = every
         self._back_emf = servos[0].back_emf
         self._sensors = sensors

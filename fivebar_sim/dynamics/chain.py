@@ -179,10 +179,8 @@ class Chain:
         # The square of four times the area of the triangle BCD (Heron), 0 where it is flat.
         area = ((L2 + L3) ** 2 - d2) * (d2 - (L2 - L3) ** 2)
 
-        regular = area > (2.0 * L2 * L3 * SINGULAR) ** 2
-        if regular is not True and not np.all(regular):
-            # Only a bad pose gets here; `jacobian` raises the right error, with its index.
-            kinematics.jacobian(leg, np.stack([theta_A, theta_E], axis=-1), self.assembly)
+        if not (area > (2.0 * L2 * L3 * SINGULAR) ** 2).all():
+            self._check_regular(theta_A, theta_E)
 
         along = (d2 + (L2 - L3) * (L2 + L3)) / (2.0 * d2)
         across = self.assembly * maths.sqrt(area) / (2.0 * d2)
@@ -191,6 +189,14 @@ class Chain:
         e2 = BC[0] / L2, BC[1] / L2
 
         return self.coupled(e1, e2, ((BC[0] - x) / L3, (BC[1] - z) / L3), e4)
+
+    def check_pose(self, theta_A: Scalar, theta_E: Scalar) -> None:
+        """Raise what `pose` raises of motor angles [rad], where nobody needs the pose yet."""
+        self.pose(theta_A, theta_E)
+
+    def _check_regular(self, theta_A: Scalar, theta_E: Scalar) -> None:
+        """Raise what is wrong with motor angles [rad], and where: `kinematics.jacobian` knows."""
+        kinematics.jacobian(self.leg, np.stack([theta_A, theta_E], axis=-1), self.assembly)
 
     def coupled(self, e1: Vector, e2: Vector, e3: Vector, e4: Vector) -> Pose:
         """Return the pose of the links' directions; e2 and e3 must not be in line.

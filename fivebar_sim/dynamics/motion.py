@@ -107,8 +107,7 @@ def simulate_chain(
             raise ArgumentError(f"{name} must be a whole number of at least 1, got {count!r}")
     q, w = _start(theta, theta_dot)
     plant = _Plant(chain, torque, foot_force)
-    # A bad start raises its own error here, not one of a motion that diverged.
-    plant.chain.pose(q[..., 0], q[..., 1])
+    plant.chain.check_pose(q[..., 0], q[..., 1])
     return _runge_kutta(plant, q, w, timestep, range(0, steps + 1, every), steps)
 
 
@@ -174,7 +173,7 @@ def integrate_chain(
     check_number("rtol", rtol, "", low=100 * np.finfo(float).eps, high=1.0)
     check_number("atol", atol, "rad", low=0.0, high=1.0)
     plant = _Plant(chain, torque, foot_force)
-    plant.chain.pose(q[0], q[1])
+    plant.chain.check_pose(q[0], q[1])
     states = _dop853(plant, np.concatenate([q, w]), t, rtol, atol)
 
     return Motion(t.copy(), states[:, :2].copy(), states[:, 2:].copy())

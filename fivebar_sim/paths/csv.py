@@ -95,9 +95,16 @@ class Csv(FootPath, frozen=True, tag="csv", dict=True):
                 number), the period does not fit the points, or the path ends within the ramp.
         """
         bound = msgspec.structs.replace(self, file=str((folder / self.file).absolute()))
-        # Read now, so that a bad file is refused before the run and not during it.
-        _ = bound._curve
+        bound.check_file()
         return bound
+
+    def check_file(self) -> None:
+        """Read the file now, so that a bad one is refused before the run and not during it.
+
+        Raises:
+            ConfigError: What `resolve` raises.
+        """
+        _ = self._curve
 
     @cached_property
     def _curve(self) -> _Curve:

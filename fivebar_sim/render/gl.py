@@ -42,6 +42,15 @@ def works(way: str) -> bool:
         return False
 
 
+def check_available() -> None:
+    """Raise unless pictures can be drawn off screen.
+
+    Raises:
+        ConfigError: None of `WAYS` works; names the Debian packages.
+    """
+    find()
+
+
 def find() -> str:
     """Return the first of `WAYS` that works; on systems other than Linux "native", MuJoCo's own.
 

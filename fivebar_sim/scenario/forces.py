@@ -157,9 +157,16 @@ class Csv(FootForce, frozen=True, tag="csv", dict=True):
             ConfigError: The file cannot be read, or a line of it is illegal; gives its number.
         """
         bound = msgspec.structs.replace(self, file=str((folder / self.file).absolute()))
-        # Read now, so that a bad file is refused before the run and not during it.
-        _ = bound._track
+        bound.check_file()
         return bound
+
+    def check_file(self) -> None:
+        """Read the file now, so that a bad one is refused before the run and not during it.
+
+        Raises:
+            ConfigError: What `resolve` raises.
+        """
+        _ = self._track
 
     @cached_property
     def _track(self) -> Track:

@@ -290,7 +290,7 @@ def _check_window(scenario: Scenario, where: str) -> None:
 
     # Asked only for its check: a bus faster than the timestep is refused.
     try:
-        scenario.servo.latched(1, h)
+        scenario.servo.check_rate(h)
     except ArgumentError as error:
         raise ConfigError(f"{where}: servo.{error}") from None
 

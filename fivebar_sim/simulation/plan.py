@@ -12,7 +12,7 @@ from fivebar_sim.arrays import Array
 from fivebar_sim.control import Feedback, Setpoints
 from fivebar_sim.control.bus import Bus
 from fivebar_sim.control.interface import answer_of, is_numbers
-from fivebar_sim.control.step import whole_steps
+from fivebar_sim.control.step import check_whole_steps, whole_steps
 from fivebar_sim.errors import ConfigError
 from fivebar_sim.motion import Motion
 from fivebar_sim.scenario import Scenario
@@ -95,7 +95,7 @@ def plan(scenario: Scenario) -> Plan:
 
     # Called for its check alone: a bad period is refused now, not during the run.
     if asked:
-        period_steps(planned)
+        check_period(planned)
     return planned
 
 
@@ -132,6 +132,16 @@ def _setpoints(scenario: Scenario, controller: Setpoints, wanted: Motion) -> Arr
     # Until the first setpoint arrives the servos hold the start pose.
     bus.restart(np.arange(1), wanted.q[:1, ::2])
     return bus.send_all(ctrl[None].astype(np.float64))[0]
+
+
+def check_period(plan: Plan) -> None:
+    """Raise unless a plan's control period is a whole number of timesteps.
+
+    Raises:
+        ArgumentError: It is not.
+    """
+    controller = cast(Feedback, plan.scenario.controller)
+    check_whole_steps("controller.period", controller.period, plan.motion.timestep)
 
 
 def period_steps(plan: Plan) -> int:

@@ -13,7 +13,7 @@ from fivebar_sim.checks import check_number
 from fivebar_sim.control import Observation
 from fivebar_sim.control.sensors import Sensors
 from fivebar_sim.control.servo import Drive, Servo
-from fivebar_sim.control.step import whole_steps
+from fivebar_sim.control.step import check_whole_steps
 from fivebar_sim.errors import ArgumentError, ConfigError, unknown
 from fivebar_sim.geometry import FiveBar
 from fivebar_sim.integrator import Integrator
@@ -100,7 +100,7 @@ class Task(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
         check_number("span", self.span, "rad", low=0.0, high=WIDEST, strict=True)
         check_number("spread", self.spread, "m", low=0.0, high=self.leg.size)
         check_number("timestep", self.timestep, "s", low=0.0, strict=True)
-        whole_steps("period", self.period, self.timestep)
+        check_whole_steps("period", self.period, self.timestep)
         check_number("duration", self.duration, "s", low=0.0, high=LONGEST, strict=True)
         periods = round(self.duration / self.period)
         # To a part in a million, as in `whole_steps`: decimals are rounded as floats.
