@@ -18,7 +18,7 @@ from fivebar_sim.simulation import feedback, measure
 from fivebar_sim.simulation.plan import Plan, period_steps, plan
 from fivebar_sim.simulation.provenance import provenance
 from fivebar_sim.simulation.record import broken, columns, unrecorded
-from fivebar_sim.simulation.steps import States, Watch, check, simulate
+from fivebar_sim.simulation.steps import States, Watch, check_states, simulate
 
 
 class Result(NamedTuple):
@@ -161,7 +161,7 @@ def _simulated(plans: Sequence[Plan], nthread: int, watch: Watch | None = None) 
 def _result(planned: Plan, states: States) -> Result:
     scenario = planned.scenario
     try:
-        check(states, scenario.sim.timestep)
+        check_states(states, scenario.sim.timestep)
         _check_resolution(scenario)
     except DivergedError as error:
         raise broken(planned, states, error) from None

@@ -18,7 +18,7 @@ from fivebar_sim.recording import leg as scene
 from fivebar_sim.recording import rrd
 from fivebar_sim.recording.foot import TRAIL
 from fivebar_sim.recording.plots import series
-from fivebar_sim.recording.poses import drawn_rows, motion
+from fivebar_sim.recording.poses import drawn_motion, drawn_rows
 from fivebar_sim.rollout import Result
 from fivebar_sim.scenario import Scenario
 
@@ -39,7 +39,7 @@ def row_by_row(path: Path, result: Result) -> float:
     record = result.record
     stamps = record["time"]
     drawn = set(drawn_rows(record["time"]).tolist())
-    moved = motion(record, np.arange(len(stamps)))
+    moved = drawn_motion(record, np.arange(len(stamps)))
     frames = scene.link_frames(leg, moved.q)
     foot = scene.in_space(moved.world_foot)
     target = scene.in_space(moved.target)

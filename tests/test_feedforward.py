@@ -71,7 +71,7 @@ def tracking(
     scene = Payload(mass=payload)
     mj = model.build(leg, servo=servo, scene=scene, timestep=h, integrator=integrator)
     states = simulate.simulate(mj, m.q[:1], np.concatenate([m.force[:-1], u], axis=1)[None])
-    simulate.check(states, h)
+    simulate.check_states(states, h)
     foot = kinematics.chain_points(leg, states.qpos[0]).F
     return rms((foot - m.foot[1:])[round(RAMP / h) :])
 

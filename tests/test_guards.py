@@ -202,7 +202,7 @@ def test_everyone_is_told(shell: Shell) -> None:
 def test_new_guard_is_a_row_and_a_function(shell: Shell, monkeypatch: pytest.MonkeyPatch) -> None:
     """Verdict, console, report and JUnit have a guard that only its row names."""
 
-    def too_deep(run: guards.Checked) -> guards.Found:
+    def too_deep(run: guards.Evidence) -> guards.Found:
         depth = float(-run.record["foot_z"].min())
         return guards.Found(depth, 0.01, float(run.record["time"][3]))
 

@@ -169,7 +169,7 @@ def test_energy_and_guards_are_those_of_the_whole_run(rng: np.random.Generator, 
     more = besides(record, saturated)
     works = energy.balance(energy.Body(LEG, *mine), record, more.steps)
     assert found["energy"] == msgspec.to_builtins(energy.measure(works))
-    checked = guards.Checked(
+    checked = guards.Evidence(
         scenario.guards,
         LEG,
         record,

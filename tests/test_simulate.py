@@ -141,7 +141,7 @@ def states(**changes: np.ndarray) -> States:
         iterations=np.ones((1, 10)),
         warnings=np.zeros(1, dtype=int),
     )
-    steps.check(good, 1e-3)
+    steps.check_states(good, 1e-3)
     return good._replace(**changes)
 
 
@@ -159,5 +159,5 @@ def test_refusal_of_each_breakdown() -> None:
         (states(warnings=np.array([2])), 0.010),
     ):
         with pytest.raises(DivergedError) as caught:
-            steps.check(bad, 1e-3)
+            steps.check_states(bad, 1e-3)
         assert caught.value.time == pytest.approx(time)

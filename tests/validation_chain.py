@@ -92,7 +92,7 @@ def swing(integrator: Integrator, timestep: float) -> Swing:
     q = kinematics.joint_motion(LEG, foot, rest, rest).q
     ctrl = np.broadcast_to(SLACK, (1, round(SECONDS / timestep), 2))
     states = steps.simulate(mj, q, ctrl)
-    steps.check(states, timestep)
+    steps.check_states(states, timestep)
     theta, theta_dot = (rows[0][:, ::2] for rows in (states.qpos, states.qvel))
     return Swing(states.time[0], _fraction(theta, theta_dot))
 

@@ -55,12 +55,12 @@ def run(
 def _viewer(address: str | None) -> str:
     """Return the address of a running viewer; if none is given, start one."""
     from fivebar_sim.recording import live
-    from fivebar_sim.render.screen import check
+    from fivebar_sim.render import screen
 
     if address is not None:
-        return live.check_address(address)
-    check("--live-at shows the run in a viewer that already listens")
-    return live.spawn_viewer()
+        return live.checked(address)
+    screen.check("--live-at shows the run in a viewer that listens already")
+    return live.spawned()
 
 
 def _execute(planned: Plan, viewer: str | None) -> Result:

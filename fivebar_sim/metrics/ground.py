@@ -11,17 +11,17 @@ from fivebar_sim.geometry import FiveBar
 from fivebar_sim.metrics.json_types import Amount, Number, Part, Table
 
 
-class Force(Table, frozen=True):
+class GroundForce(Table, frozen=True):
     """Largest forces of the ground on the foot [N]."""
 
     x: Number
     z: Number
 
 
-class Ground(Table, frozen=True):
+class GroundMetrics(Table, frozen=True):
     """The table "ground" of metrics.json; see `measure`."""
 
-    force_max: Force
+    force_max: GroundForce
     stance_share: Part
     slip: Amount
     foot_height_max: Number
@@ -64,7 +64,7 @@ def slid(leg: FiveBar, record: Mapping[str, Array]) -> Array:
     return np.diff(record["foot_x"] - belt) + 0.5 * (r[1:] + r[:-1]) * np.diff(psi_2)
 
 
-def measure(leg: FiveBar, record: Mapping[str, Array], window: slice) -> Ground:
+def measure(leg: FiveBar, record: Mapping[str, Array], window: slice) -> GroundMetrics:
     """Return the metrics of the ground.
 
     force_max, foot_height_max and flight_max (the longest time without force, that of a drop
@@ -80,8 +80,8 @@ def measure(leg: FiveBar, record: Mapping[str, Array], window: slice) -> Ground:
     h = float(record["time"][0])
     slip = np.concatenate([[0.0], np.abs(slid(leg, record)) * down[1:]])[window]
 
-    return Ground(
-        force_max=Force(
+    return GroundMetrics(
+        force_max=GroundForce(
             x=float(np.abs(record["ground_x"]).max()),
             z=float(record["ground_z"].max()),
         ),

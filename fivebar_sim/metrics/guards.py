@@ -88,7 +88,7 @@ class Guard(Table, frozen=True):
         return f"guard {self.name}: {bound} at t = {self.time:g} s{worst}"
 
 
-class Checked(NamedTuple):
+class Evidence(NamedTuple):
     """The run that guards look at, over all of its steps.
 
     Attributes:
@@ -133,7 +133,7 @@ class Row(NamedTuple):
     """
 
     name: str
-    function: Callable[[Checked], Found | None]
+    function: Callable[[Evidence], Found | None]
     what: str
     worst: str
     scale: float
@@ -144,7 +144,7 @@ class Row(NamedTuple):
         return f"{self.scale * (value or 0.0):.4g} {self.unit}"
 
 
-def judge(run: Checked) -> list[Guard]:
+def judge(run: Evidence) -> list[Guard]:
     """Return every guard of a run."""
     found = [(row.name, row.function(run)) for row in GUARDS]
     return [
@@ -159,46 +159,46 @@ def tripped(guards: Sequence[Guard]) -> list[str]:
     return [str(guard) for guard in guards if not guard.ok]
 
 
-def _left_branch(run: Checked) -> Found:
+def _left_branch(run: Evidence) -> Found:
     return Found(float(run.branch.flips), 0.0, run.branch.first_flip)
 
 
-def _open_loop(run: Checked) -> Found:
+def _open_loop(run: Evidence) -> Found:
     return _highest(run, run.record["gap"], run.bounds.loop * run.leg.size)
 
 
-def _clipped_torque(run: Checked) -> Found:
+def _clipped_torque(run: Evidence) -> Found:
     return _highest(run, clipped(run.saturated, run.record["time"]), run.bounds.torque)
 
 
-def _chatter(run: Checked) -> Found:
+def _chatter(run: Evidence) -> Found:
     return _highest(run, chattering(run.record, run.command), run.bounds.chatter)
 
 
-def _unaccounted_energy(run: Checked) -> Found:
+def _unaccounted_energy(run: Evidence) -> Found:
     return _part(run, run.balance.unaccounted, run.bounds.energy)
 
 
-def _giving_constraints(run: Checked) -> Found:
+def _giving_constraints(run: Evidence) -> Found:
     return _part(run, run.balance.given, run.bounds.constraints)
 
 
-def _giving_steps(run: Checked) -> Found:
+def _giving_steps(run: Evidence) -> Found:
     return _part(run, np.cumsum(run.balance.step), run.bounds.step)
 
 
-def _unsolved(run: Checked) -> Found:
+def _unsolved(run: Evidence) -> Found:
     return Found(float(run.unsolved.sum()), 0.0, _first(run.unsolved, run.record["time"]))
 
 
-def _in_floor(run: Checked) -> Found | None:
+def _in_floor(run: Evidence) -> Found | None:
     if "ground_z" not in run.record:
         return None
     depth = np.maximum(-ground.height(run.leg, run.record), 0.0)
     return _highest(run, depth, run.bounds.ground * 2.0 * run.leg.foot_radius)
 
 
-def _highest(run: Checked, values: Array, high: float) -> Found:
+def _highest(run: Evidence, values: Array, high: float) -> Found:
     return Found(float(values.max()), high, _first(values > high, run.record["time"]))
 
 
@@ -206,7 +206,7 @@ def _first(chosen: Bools, time: Array) -> float | None:
     return float(time[np.argmax(chosen)]) if chosen.any() else None
 
 
-def _part(run: Checked, energy: Array, high: float) -> Found:
+def _part(run: Evidence, energy: Array, high: float) -> Found:
     """Return the largest |energy so far|, in parts of what was turned over in the run."""
     balance = run.balance
     if balance.imbalance is None:

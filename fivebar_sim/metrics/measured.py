@@ -14,7 +14,7 @@ import msgspec
 from fivebar_sim.metrics.branch import Branch
 from fivebar_sim.metrics.catalogue import MEASURED, Metric
 from fivebar_sim.metrics.energy import Energy
-from fivebar_sim.metrics.ground import Ground
+from fivebar_sim.metrics.ground import GroundMetrics
 from fivebar_sim.metrics.guards import Guard
 from fivebar_sim.metrics.json_types import LARGEST, Count, Table
 from fivebar_sim.metrics.limits import Limit, WrittenLimit
@@ -33,7 +33,7 @@ class Measured(Table, frozen=True, kw_only=True, dict=True):
     branch: Branch
     guards: list[Guard]
     warnings: Count
-    ground: Ground | msgspec.UnsetType = msgspec.UNSET
+    ground: GroundMetrics | msgspec.UnsetType = msgspec.UNSET
 
     @cached_property
     def table(self) -> dict[str, Any]:
@@ -57,7 +57,7 @@ def of(
     branch: Branch,
     guards: list[Guard],
     warnings: int,
-    ground: Ground | msgspec.UnsetType,
+    ground: GroundMetrics | msgspec.UnsetType,
 ) -> Measured:
     """Return what a run measured.
 
@@ -117,7 +117,7 @@ def kinds(rows: Sequence[Metric]) -> dict[str, type[Table]]:
         number = Optional[Annotated[float, msgspec.Meta(ge=low, le=LARGEST)]]  # noqa: UP045
         tables.setdefault(table, []).append((name, number))
 
-    own = {"load": Load, "energy": Energy, "branch": Branch, "ground": Ground}
+    own = {"load": Load, "energy": Energy, "branch": Branch, "ground": GroundMetrics}
     return {
         table: _defined(f"{table.capitalize()}Rows", names, own.get(table, Table), kw_only=True)
         for table, names in tables.items()

@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 
 from fivebar_sim.errors import ArgumentError, ConfigError
 from fivebar_sim.paths.base import TIME_ROUNDING, FootPath, Sample, check_number
-from fivebar_sim.paths.track import Track, read_track
+from fivebar_sim.paths.track import TimedPairs, read_track
 
 if TYPE_CHECKING:
     from scipy.interpolate import CubicSpline
@@ -124,7 +124,7 @@ class Csv(FootPath, frozen=True, tag="csv", dict=True):
         return _Curve(CubicSpline(time, foot, bc_type="periodic"), track.span, float(time[-1]))
 
 
-def _close_loop(track: Track, period: float | None, where: str) -> Track:
+def _closed(track: TimedPairs, period: float | None, where: str) -> TimedPairs:
     """Return a track whose last point is its first, one period later."""
     time, foot = track
     span = track.span
@@ -141,11 +141,11 @@ def _close_loop(track: Track, period: float | None, where: str) -> Track:
     same = math.isclose(period, span, rel_tol=TIME_ROUNDING)
     if same and track.closed:
         # The periodic spline wants both ends equal to the last bit.
-        return Track(time, np.concatenate([foot[:-1], foot[:1]]))
+        return TimedPairs(time, np.concatenate([foot[:-1], foot[:1]]))
 
     if same or not period > span:
         relation = ">=" if track.closed else ">"
         raise ConfigError(
             f"{where}: period must be {relation} {span:.9g} s, the sampled span, got {period:.9g} s"
         )
-    return Track(np.append(time, period), np.concatenate([foot, foot[:1]]))
+    return TimedPairs(np.append(time, period), np.concatenate([foot, foot[:1]]))

@@ -25,7 +25,7 @@ SHORTEST = 1e-9
 """Lower end of the time between two rows [s]: rates over shorter ones overflow."""
 
 
-class Track(NamedTuple):
+class TimedPairs(NamedTuple):
     """The rows of a CSV file.
 
     Attributes:
@@ -47,7 +47,7 @@ class Track(NamedTuple):
         return bool(np.max(np.abs(self.pair[-1] - self.pair[0])) <= SAME_POINT)
 
 
-def read_track(file: Path, headers: Headers, what: str) -> Track:
+def read_track(file: Path, headers: Headers, what: str) -> TimedPairs:
     """Return the rows of a CSV file, in SI units and from t = 0.
 
     Args:
@@ -89,7 +89,7 @@ def read_track(file: Path, headers: Headers, what: str) -> Track:
 
     if len(rows) < 2:
         raise ConfigError(f"{file}: a {what} needs at least 2 rows, got {len(rows)}")
-    return Track(table[:, 0] - table[0, 0], scale * table[:, 1:])
+    return TimedPairs(table[:, 0] - table[0, 0], scale * table[:, 1:])
 
 
 def _lines(file: Path, what: str) -> list[tuple[int, list[str]]]:

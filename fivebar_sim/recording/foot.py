@@ -13,7 +13,7 @@ from fivebar_sim.arrays import Array
 from fivebar_sim.geometry import FiveBar
 from fivebar_sim.recording.leg import HIP, in_space
 from fivebar_sim.recording.look import GREEN, RED, Colour, Look
-from fivebar_sim.recording.poses import Motion
+from fivebar_sim.recording.poses import DrawnMotion
 
 if TYPE_CHECKING:
     import rerun as rr
@@ -78,7 +78,11 @@ def fade(colour: Colour, fresh: float) -> Colour:
 
 
 def send_foot(
-    stream: rr.RecordingStream, leg: FiveBar, moved: Motion, look: Look, times: list[rr.TimeColumn]
+    stream: rr.RecordingStream,
+    leg: FiveBar,
+    moved: DrawnMotion,
+    look: Look,
+    times: list[rr.TimeColumn],
 ) -> None:
     """Send the target and the trail, as columns.
 

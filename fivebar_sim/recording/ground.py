@@ -9,7 +9,7 @@ import numpy as np
 from fivebar_sim.geometry import FiveBar
 from fivebar_sim.recording.leg import in_space
 from fivebar_sim.recording.look import GREY, LIGHT_GREY, YELLOW, Look
-from fivebar_sim.recording.poses import Motion, Stage
+from fivebar_sim.recording.poses import DrawnMotion, Room
 
 if TYPE_CHECKING:
     import rerun as rr
@@ -24,7 +24,7 @@ STRIPES = 8
 """Number of stripes across a belt."""
 
 
-def log_floor(stream: rr.RecordingStream, stage: Stage) -> None:
+def log_floor(stream: rr.RecordingStream, stage: Room) -> None:
     """Log the floor under all legs; its surface is at z = 0."""
     import rerun as rr
 
@@ -41,21 +41,21 @@ def log_floor(stream: rr.RecordingStream, stage: Stage) -> None:
     stream.log(FLOOR, floor, static=True)
 
 
-def _start(stage: Stage) -> float:
+def _start(stage: Room) -> float:
     return float(stage.low[0]) - MARGIN * stage.size
 
 
-def _length(stage: Stage) -> float:
+def _length(stage: Room) -> float:
     return float(stage.high[0] - stage.low[0]) + 2.0 * MARGIN * stage.size
 
 
 def send_ground(
     stream: rr.RecordingStream,
     leg: FiveBar,
-    moved: Motion,
+    moved: DrawnMotion,
     look: Look,
     times: list[rr.TimeColumn],
-    stage: Stage,
+    stage: Room,
 ) -> None:
     """Send the ground's force on the foot, and the belt, as columns, if there are any.
 

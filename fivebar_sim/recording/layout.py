@@ -11,7 +11,7 @@ from fivebar_sim.recording.foot import BACKGROUND, TRAIL
 from fivebar_sim.recording.leg import in_space
 from fivebar_sim.recording.look import Look
 from fivebar_sim.recording.plots import Series
-from fivebar_sim.recording.poses import Stage
+from fivebar_sim.recording.poses import Room
 
 if TYPE_CHECKING:
     import rerun as rr
@@ -25,7 +25,7 @@ LEGEND = 8
 
 
 def contents(
-    stage: Stage, looks: Sequence[Look], plots: Sequence[Sequence[Series]]
+    stage: Room, looks: Sequence[Look], plots: Sequence[Sequence[Series]]
 ) -> rrb.Container:
     """Return the views of all runs.
 
@@ -46,7 +46,7 @@ def contents(
     return rrb.Horizontal(left, rrb.Grid(*views, grid_columns=2), column_shares=[2, 3])
 
 
-def leg_view(stage: Stage, looks: Sequence[Look]) -> rrb.Spatial3DView:
+def leg_view(stage: Room, looks: Sequence[Look]) -> rrb.Spatial3DView:
     """Return the 3D view: from the front, slightly above, all of the motion in sight."""
     import rerun.blueprint as rrb
 

@@ -28,7 +28,7 @@ from fivebar_sim.recording.look import (
     Colour,
     Look,
 )
-from fivebar_sim.recording.poses import Motion, in_height
+from fivebar_sim.recording.poses import DrawnMotion, in_height
 
 if TYPE_CHECKING:
     import rerun as rr
@@ -168,7 +168,11 @@ def _axle(
 
 
 def send_leg(
-    stream: rr.RecordingStream, leg: FiveBar, moved: Motion, look: Look, times: list[rr.TimeColumn]
+    stream: rr.RecordingStream,
+    leg: FiveBar,
+    moved: DrawnMotion,
+    look: Look,
+    times: list[rr.TimeColumn],
 ) -> None:
     """Send the poses of the links as columns, and that of the hip where it moves."""
     import rerun as rr

@@ -21,7 +21,7 @@ from fivebar_sim.recording import leg as scene
 from fivebar_sim.recording import viewer as recording_viewer
 from fivebar_sim.recording.look import Look
 from fivebar_sim.recording.plots import Series, series
-from fivebar_sim.recording.poses import Motion, Stage, motion, stage
+from fivebar_sim.recording.poses import DrawnMotion, Room, drawn_motion, room_of
 from fivebar_sim.scenario.scenes import Ground
 from fivebar_sim.simulation.plan import Plan
 from fivebar_sim.simulation.record import columns
@@ -201,7 +201,7 @@ class _Sender:
             self._begin_recording(plots, look)
 
         rows = np.arange(0, len(record["time"]), max(1, round(1.0 / (RATE * h))))
-        moved = motion(record, rows)
+        moved = drawn_motion(record, rows)
         at = rrd.times(record["time"][rows], self._begin + rows + 1)
         scene.send_leg(stream, leg, moved, look, at)
         foot.send_foot(stream, leg, moved, look, at)
@@ -230,8 +230,8 @@ def _markdown(text: str) -> rr.TextDocument:
     return rr.TextDocument(text, media_type="text/markdown")
 
 
-def _room(planned: Plan) -> Stage:
-    """Return the space that the planned motion needs."""
+def _room(planned: Plan) -> Room:
+    """Return the room that the planned motion needs; how large forces will be is not known yet."""
     leg = planned.scenario.leg
     record = planned.motion
     # Some 500 poses show where the leg goes, however long the run is.
@@ -242,7 +242,9 @@ def _room(planned: Plan) -> Stage:
     if isinstance(ground_scene, Ground):
         hip = np.full(len(record.q[every]), planned.start[0])
 
-    room = stage([leg], [Motion(record.q[every], record.foot[every], record.foot[every], hip)])
+    room = room_of(
+        [leg], [DrawnMotion(record.q[every], record.foot[every], record.foot[every], hip)]
+    )
     if not isinstance(ground_scene, Ground):
         return room
 

@@ -18,7 +18,7 @@ POSE_PERIOD = 0.01
 """Time between two drawn poses [s]: 100 Hz looks like every step, at a fraction of the size."""
 
 
-class Motion(NamedTuple):
+class DrawnMotion(NamedTuple):
     """The rows that are drawn; lengths in m, angles in rad, forces in N.
 
     Attributes:
@@ -43,9 +43,9 @@ class Motion(NamedTuple):
         return self.foot if self.hip is None else self.foot + in_height(self.hip)
 
 
-def motion(record: Mapping[str, Array], rows: Rows) -> Motion:
+def drawn_motion(record: Mapping[str, Array], rows: Rows) -> DrawnMotion:
     """Return some rows of a record."""
-    return Motion(
+    return DrawnMotion(
         q=np.stack([record[f"theta_{joint}"][rows] for joint in "ABED"], axis=-1),
         foot=points(record, "foot")[rows],
         target=points(record, "target")[rows],
@@ -79,8 +79,8 @@ def in_height(z: ArrayLike) -> Array:
     return np.stack([np.zeros_like(height), height], axis=-1)
 
 
-class Stage(NamedTuple):
-    """The space that all runs of a recording need together; the floor is the plane z = 0.
+class Room(NamedTuple):
+    """The room that all runs of a recording need together; the floor is the plane z = 0.
 
     Attributes:
         low: The lowest (x, z) that any leg reaches, or the floor's height if it is lower [m].
@@ -97,8 +97,8 @@ class Stage(NamedTuple):
     floor: bool
 
 
-def stage(legs: Sequence[FiveBar], moved: Sequence[Motion]) -> Stage:
-    """Return the space that legs and their motions need."""
+def room_of(legs: Sequence[FiveBar], moved: Sequence[DrawnMotion]) -> Room:
+    """Return the room that legs and their motions need."""
     places = np.concatenate([_places(leg, each) for leg, each in zip(legs, moved, strict=True)])
     forces = [np.hypot(*each.force.T).max() for each in moved if each.force is not None]
     floor = any(each.hip is not None for each in moved)
@@ -108,10 +108,10 @@ def stage(legs: Sequence[FiveBar], moved: Sequence[Motion]) -> Stage:
     largest = float(max(forces, default=0.0))
     # Without any force there is no arrow to scale.
     scale = 0.5 * size / largest if largest > 0.0 else 0.0
-    return Stage(places.min(axis=0), places.max(axis=0), size, scale, floor)
+    return Room(places.min(axis=0), places.max(axis=0), size, scale, floor)
 
 
-def _places(leg: FiveBar, moved: Motion) -> Array:
-    """Return all positions of a leg's joints [m], (..., 2)."""
+def _places(leg: FiveBar, moved: DrawnMotion) -> Array:
+    """Return everywhere that the joints of a leg come to [m], (..., 2)."""
     hip = in_height(np.zeros(len(moved.q)) if moved.hip is None else moved.hip)
     return np.concatenate([hip + p for p in (*bases(leg), *chain_points(leg, moved.q))])

@@ -24,7 +24,15 @@ from fivebar_sim.recording import foot, ground, layout
 from fivebar_sim.recording import leg as scene
 from fivebar_sim.recording.look import Look, looks
 from fivebar_sim.recording.plots import Series, series
-from fivebar_sim.recording.poses import Motion, Rows, Stage, drawn_rows, motion, points, stage
+from fivebar_sim.recording.poses import (
+    DrawnMotion,
+    Room,
+    Rows,
+    drawn_motion,
+    drawn_rows,
+    points,
+    room_of,
+)
 from fivebar_sim.recording.summary import summary
 
 if TYPE_CHECKING:
@@ -133,9 +141,9 @@ def _send(stream: rr.RecordingStream, runs: Sequence[Run], names: list[str]) -> 
     import rerun as rr
 
     shown = looks(names)
-    moved = [motion(run.record, drawn_rows(run.record["time"])) for run in runs]
+    moved = [drawn_motion(run.record, drawn_rows(run.record["time"])) for run in runs]
     plots = [list(series(run.scenario, run.record)) for run in runs]
-    room = stage([run.scenario.leg for run in runs], moved)
+    room = room_of([run.scenario.leg for run in runs], moved)
     text = summary(names, [run.measured for run in runs], [run.scenario.limits for run in runs])
     layout.send(stream, layout.contents(room, shown, plots))
     stream.log(layout.SUMMARY, rr.TextDocument(text, media_type="text/markdown"), static=True)
@@ -163,8 +171,8 @@ def started(name: str) -> rr.RecordingStream:
     return stream
 
 
-def log_room(stream: rr.RecordingStream, room: Stage) -> None:
-    """Log what belongs to no single leg: which way is up, and the floor."""
+def log_room(stream: rr.RecordingStream, room: Room) -> None:
+    """Log what does not belong to any leg: which way is up, and the floor."""
     import rerun as rr
 
     stream.log("/", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
@@ -176,9 +184,9 @@ def _send_run(
     stream: rr.RecordingStream,
     run: Run,
     look: Look,
-    moved: Motion,
+    moved: DrawnMotion,
     plots: list[Series],
-    room: Stage,
+    room: Room,
 ) -> None:
     """Send one run: the leg's numbers and its motion, the foot, the ground, the plots."""
     import rerun as rr

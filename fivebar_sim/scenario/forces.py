@@ -18,7 +18,7 @@ from fivebar_sim.arrays import Array
 from fivebar_sim.errors import ArgumentError
 from fivebar_sim.paths import FootPath, Gait
 from fivebar_sim.paths.base import Pair, check_pair, times
-from fivebar_sim.paths.track import Track, read_track
+from fivebar_sim.paths.track import TimedPairs, read_track
 
 __all__ = ["KINDS", "Constant", "Csv", "FootForce", "ForceSpec", "Stance"]
 
@@ -169,7 +169,7 @@ class Csv(FootForce, frozen=True, tag="csv", dict=True):
         _ = self._track
 
     @cached_property
-    def _track(self) -> Track:
+    def _track(self) -> TimedPairs:
         return read_track(Path(self.file), HEADERS, "foot force")
 
 

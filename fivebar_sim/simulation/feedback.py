@@ -15,7 +15,7 @@ from fivebar_sim.errors import ConfigError, DivergedError, PoseError
 from fivebar_sim.motion import Motion
 from fivebar_sim.simulation.plan import Plan, period_steps
 from fivebar_sim.simulation.record import broken
-from fivebar_sim.simulation.steps import States, Watch, check, is_broken, simulate_asking
+from fivebar_sim.simulation.steps import States, Watch, check_states, is_broken, simulate_asking
 
 MOTORS = slice(-4, None, 2)
 """Where qpos and qvel have A and E."""
@@ -81,7 +81,7 @@ def _raise_broken(plans: Sequence[Plan], states: States) -> None:
     for row, plan in enumerate(plans):
         own = states.rows([row])
         try:
-            check(own, plan.motion.timestep)
+            check_states(own, plan.motion.timestep)
         except DivergedError as error:
             raise broken(plan, own, error) from None
 

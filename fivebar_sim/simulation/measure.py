@@ -55,7 +55,7 @@ def measure(scenario: Scenario, record: Mapping[str, Array], besides: Unrecorded
     body = energy.Body(leg, scenario.payload, scenario.trunk)
     balance = energy.balance(body, record, besides.steps)
     folded = branch.measure(leg, record)
-    checked = guards.Checked(
+    checked = guards.Evidence(
         bounds=scenario.guards,
         leg=leg,
         record=record,

@@ -235,7 +235,7 @@ def simulate_asking(
     return states.part(slice(k))
 
 
-def check(states: States, timestep: float) -> None:
+def check_states(states: States, timestep: float) -> None:
     """Raise if a simulation broke down: not finite, too fast, warned about, or time stood still.
 
     MuJoCo stops stepping a simulation at its first warning; its later rows repeat.

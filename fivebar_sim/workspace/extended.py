@@ -42,7 +42,7 @@ SHORTEST = 1e-9
 """Least |BF| relative to the leg's size: with the foot on B the direction of L2 is undefined."""
 
 
-class Circle(NamedTuple):
+class InLineCircle(NamedTuple):
     """A circle about A on which A, B and F are in line.
 
     Attributes:
@@ -68,7 +68,7 @@ class Extended(NamedTuple):
     leg: FiveBar
     elbow: int
     bar: FourBar
-    circles: tuple[Circle, ...]
+    circles: tuple[InLineCircle, ...]
     curves: Curves
 
     @property
@@ -145,8 +145,8 @@ class Extended(NamedTuple):
         pieces += [self.curves.F[start:stop] for start, stop in self.curves.ends]
         return [to_hip(self.leg, piece) for piece in pieces]
 
-    def _arcs(self, circle: Circle) -> list[tuple[float, float]]:
-        """Return the directions of F on a circle at which E reaches C."""
+    def _arcs(self, circle: InLineCircle) -> list[tuple[float, float]]:
+        """Return the directions of F at which E reaches the C of a circle."""
         low, high = _reach(self.leg)
         turn = float(np.angle(circle.C))
         return [(a - turn, b - turn) for a, b in spans(abs(circle.C), self.leg.L5, low, high)]
@@ -201,9 +201,9 @@ def region(leg: FiveBar, elbow: int) -> Extended:
     low, high = _reach(leg)
     offset = complex(*leg.foot_offset)
     bar = FourBar(leg.L1, leg.L2, high, leg.L5, offset)
-    outer = Circle(leg.L1 + rho, leg.L1 + leg.L2 * rho / offset)
+    outer = InLineCircle(leg.L1 + rho, leg.L1 + leg.L2 * rho / offset)
     inward = 1.0 if leg.L1 >= rho else -1.0
-    inner = Circle(abs(leg.L1 - rho), inward * (leg.L1 - leg.L2 * rho / offset))
+    inner = InLineCircle(abs(leg.L1 - rho), inward * (leg.L1 - leg.L2 * rho / offset))
     # Squares, as in `reaches`: both must call the same hole rounding.
     holed = inner.radius**2 > ROUNDING * outer.radius**2
     curves = _curves(leg, elbow, bar, low, high)
