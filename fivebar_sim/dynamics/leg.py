@@ -10,14 +10,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from fivebar_sim import kinematics
-from fivebar_sim.arrays import Array, as_pairs, at, broadcast, finite, first_index
+from fivebar_sim.arrays import Array, as_pairs, finite, together
 from fivebar_sim.checks import check_number
 from fivebar_sim.dynamics import motion, stepwise
 from fivebar_sim.dynamics.chain import Chain, Vector, cross, placed
 from fivebar_sim.dynamics.motion import Law, Motion
-from fivebar_sim.errors import SingularError
 from fivebar_sim.geometry import FiveBar
-from fivebar_sim.kinematics.rates import SINGULAR
+from fivebar_sim.kinematics.rates import check_sine
 
 
 class Energy(NamedTuple):
@@ -132,8 +131,9 @@ class LegDynamics:
         p = self._chain.pose(*_split(theta))
         # Where the foot cannot move in some direction the world feels an infinite mass.
         rho = float(np.hypot(*self.leg.foot_offset))
-        _refuse(cross(p.e1, placed(p.e2, self.leg.foot_offset)) / rho, "A, B and F are in line")
-        _refuse(cross(p.e4, p.e3), "E, D and C are in line")
+        reach = cross(p.e1, placed(p.e2, self.leg.foot_offset)) / rho
+        check_sine(reach, "A, B and F are in line, the foot's inertia is infinite")
+        check_sine(cross(p.e4, p.e3), "E, D and C are in line, the foot's inertia is infinite")
         M = self.mass_matrix(theta)
         J_inv = np.linalg.inv(kinematics.jacobian(self.leg, theta, self.assembly))
         product = np.einsum("...ji,...jk,...kl->...il", J_inv, M, J_inv)
@@ -203,15 +203,3 @@ def _pairs(**values: ArrayLike) -> list[Array]:
 def _split(pairs: Array) -> Vector:
     """Return the two coordinates of pairs, each (...)."""
     return pairs[..., 0], pairs[..., 1]
-
-
-def _refuse(sine: Array, where: str) -> None:
-    """Raise if the sine of the angle between two links is within rounding of 0."""
-    # Written so that NaN is singular too.
-    singular = np.logical_not(np.abs(sine) > SINGULAR)
-    if singular.any():
-        index = first_index(singular)
-        count = f"{int(singular.sum())} of {singular.size} poses are" if index else "the pose is"
-        raise SingularError(
-            f"{count} singular: {where}, the foot's inertia is infinite{at(index)}", index
-        )

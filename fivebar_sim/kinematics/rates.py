@@ -63,7 +63,7 @@ def jacobian(leg: FiveBar, theta: ArrayLike, assembly: int | None = None) -> Arr
     CF = p.F - p.C_left
     # At m = 0 the two circles about B and D touch, and C can leave both ways.
     m = cross(BC, DC)
-    _refuse(m / (leg.L2 * leg.L3), "B, C and D are in line")
+    check_sine(m / (leg.L2 * leg.L3), "B, C and D are in line")
 
     dC_A = (cross(AB, BC) / m)[..., None] * -perp(DC)
     dC_E = (cross(ED, DC) / m)[..., None] * perp(BC)
@@ -144,7 +144,7 @@ def _side_motion(r1: Array, r2: Array, v: Array, a: Array, where: str) -> tuple[
         w = a + r1 psi_1_dot^2 + r2 psi_2_dot^2
     """
     k = cross(r1, r2)
-    _refuse(k / np.sqrt(dot(r1, r1) * dot(r2, r2)), where)
+    check_sine(k / np.sqrt(dot(r1, r1) * dot(r2, r2)), where)
     rate_1 = dot(r2, v) / k
     rate_2 = -dot(r1, v) / k
     # The centripetal part is known once the rates are: what is left is linear.
@@ -159,8 +159,16 @@ def _end_motion(r1: Array, r2: Array, rate: Pair, accel: Pair) -> tuple[Array, A
     return velocity, perp(r1) * b1 - r1 * w1**2 + perp(r2) * b2 - r2 * w2**2
 
 
-def _refuse(sine: Array, where: str) -> None:
-    """Raise if the sine of the angle between two links is within rounding of 0."""
+def check_sine(sine: Array, where: str) -> None:
+    """Raise if the sine of the angle between two links is no more than rounding.
+
+    Args:
+        sine: Sine of the angle at each pose, (...).
+        where: What it means if it is 0, for the message.
+
+    Raises:
+        SingularError: At one pose at least; `.index` is the first.
+    """
     # Written so that NaN is singular too.
     singular = ~(np.abs(sine) > SINGULAR)
     if singular.any():
