@@ -19,8 +19,7 @@ from typing import Any
 
 from fivebar_sim.checks import check_number
 from fivebar_sim.errors import ConfigError, GeometryError, unknown
-from fivebar_sim.files import resources, tables
-from fivebar_sim.links import Link, ball, capsule, combined, moved
+from fivebar_sim.files import presets
 
 Mode = tuple[int, int]
 Four = tuple[float, float, float, float]
@@ -246,12 +245,7 @@ def read_table(source: str | Path) -> dict[str, Any]:
     Raises:
         ConfigError: Unknown preset, or a file that is missing or not TOML.
     """
-    presets = resources.shipped("models/legs")
-    path = presets.get(str(source), Path(source))
-    if path.suffix != ".toml":
-        raise ConfigError(f"{unknown('leg preset', str(source), presets)}; or a path to a .toml")
-    # The file's name is the leg's, unless the file gives another.
-    return {"name": path.stem, **tables.read(path, "leg")}
+    return {"name": presets.find(source, "leg").stem, **presets.read(source, "leg")}
 
 
 def _check(key: str, value: Any, **bounds: Any) -> None:

@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 
 from fivebar_sim.arrays import Array, Bools
 from fivebar_sim.checks import check_number, check_step
-from fivebar_sim.errors import ArgumentError, ConfigError, unknown
-from fivebar_sim.files import resources, tables
+from fivebar_sim.errors import ArgumentError
+from fivebar_sim.files import presets, tables
 from fivebar_sim.integrator import Integrator
 
 Drive = Literal["position", "torque"]
@@ -204,11 +204,7 @@ def read_table(source: str | Path) -> tables.Table:
     Raises:
         ConfigError: Unknown preset, no such file, not TOML, or a number that is not finite.
     """
-    presets = resources.shipped("models/servos")
-    path = presets.get(str(source), Path(source))
-    if path.suffix != ".toml":
-        raise ConfigError(f"{unknown('servo preset', str(source), presets)}; or a path to a .toml")
-    table = tables.read(path, "servo")
+    table = presets.read(source, "servo")
     tables.check_finite(table, str(source))
     return table
 
