@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from fivebar_sim.errors import ConfigError
+from fivebar_sim.errors import ConfigError, FiveBarError
 
 
 def check_place(path: Path) -> None:
@@ -22,12 +22,24 @@ def check_place(path: Path) -> None:
     """
     try:
         _check_free(path)
-        # Missing folders are made later, so the nearest existing one decides.
-        there = next((p for p in path.absolute().parents if p.exists()), path)
     except OSError as error:
         raise ConfigError(f"cannot write {path}: {error.strerror or error}") from None
+    check_parent(path, ConfigError)
+
+
+def check_parent(path: Path, error: type[FiveBarError]) -> None:
+    """Raise unless a file or directory can be made at path; missing folders above it count.
+
+    Args:
+        path: What is to be written.
+        error: The class of error that is raised.
+    """
+    try:
+        there = next((p for p in path.absolute().parents if p.exists()), path)
+    except OSError as cause:
+        raise error(f"cannot write {path}: {cause.strerror or cause}") from None
     if not there.is_dir() or not os.access(there, os.W_OK | os.X_OK):
-        raise ConfigError(f"cannot write {path}: {there} is not a writable directory")
+        raise error(f"cannot write {path}: {there} is not a directory one may write in")
 
 
 def _check_free(path: Path) -> None:

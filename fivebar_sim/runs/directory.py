@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import errno
 import json
-import os
 import shutil
 import tempfile
 from collections.abc import Mapping
@@ -14,7 +13,7 @@ import tomli_w
 
 from fivebar_sim.arrays import Array
 from fivebar_sim.errors import RunDirectoryError
-from fivebar_sim.files import leftovers
+from fivebar_sim.files import leftovers, whole_file
 from fivebar_sim.recording import rrd
 
 FILES = ("scenario.toml", "metrics.json", "rollout.parquet", "recording.rrd")
@@ -66,7 +65,6 @@ def check_place(path: Path) -> None:
     try:
         ours = path.is_dir() and (is_run(path) or not any(path.iterdir()))
         taken = not ours and (path.exists() or path.is_symlink())
-        there = next((p for p in path.absolute().parents if p.exists()), path)
         if path.resolve() == Path.cwd():
             taken = True  # no system renames the folder it is in
     except OSError as error:
@@ -74,8 +72,7 @@ def check_place(path: Path) -> None:
 
     if taken:
         raise RunDirectoryError(f"cannot write {path}: something that is no run directory is there")
-    if not there.is_dir() or not os.access(there, os.W_OK | os.X_OK):
-        raise RunDirectoryError(f"cannot write {path}: {there} is not a directory one may write in")
+    whole_file.check_parent(path, RunDirectoryError)
 
 
 def is_run(path: Path) -> bool:
