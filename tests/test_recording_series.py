@@ -9,9 +9,8 @@ import pytest
 from recorded import LEG, Record, drawn, ellipse, read, standing, written
 
 from fivebar_sim.control.servo import Servo
-from fivebar_sim.metrics import ground
+from fivebar_sim.metrics import ground, load
 from fivebar_sim.recording import rrd
-from fivebar_sim.recording.plots import SHARE_FLOOR, load_share
 
 ANGLES = ["theta_A", "theta_B", "theta_E", "theta_D"]
 
@@ -75,7 +74,7 @@ def test_limits_of_the_servo_are_level_lines(tmp_path: Path, limit: float | None
 
 def test_load_share_is_that_of_a_plain_loop() -> None:
     torque = np.random.default_rng(3).standard_normal((60, 2))
-    share, loaded = load_share(torque, 4)
+    share, loaded = load.moving_share(torque, 4)
     assert loaded.all()
     for k in range(60):
         A, E = np.abs(torque[max(k - 4, 0) : k + 5]).sum(axis=0)
@@ -84,8 +83,9 @@ def test_load_share_is_that_of_a_plain_loop() -> None:
 
 def test_share_has_a_gap_where_there_is_no_load(tmp_path: Path) -> None:
     record = ellipse(LEG, 400)
+    largest = max(np.abs(record[column]).max() for column in ("torque_A", "torque_E"))
     for column in ("torque_A", "torque_E"):
-        record[column][100:200] = 0.9 * SHARE_FLOOR
+        record[column][100:200] = 0.9 * load.TINY * largest
     moving, _ = read(written(tmp_path / "a.rrd", LEG, record))
     empty = [not row for row in moving["/load_share"]["Scalars:scalars"]]
     # the window of 50 ms reaches 25 rows to each side

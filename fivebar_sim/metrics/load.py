@@ -123,6 +123,35 @@ def sharing(
     return found
 
 
+def moving_share(torque: Array, half: int) -> tuple[Array, Bools]:
+    """Return A's part of the absolute torque impulse in a moving window, where there is load.
+
+        share_A = sum |tau_A| / (sum |tau_A| + sum |tau_E|),   over rows k - half ... k + half
+
+    The window is cut off at both ends of the record.
+
+    Args:
+        torque: (tau_A, tau_E) [N m], (N, 2).
+        half: Rows on each side of the window's centre.
+
+    Returns:
+        share_A in [0, 1] of the rows under load, (n,), and which rows those are, (N,): those in
+        whose window a torque passes `TINY` of the largest of all rows, as for `share_A`.
+    """
+    amount = np.abs(torque)
+    real = (amount > TINY * amount.max()).any(axis=1)
+    k = np.arange(len(torque))
+    low = np.maximum(k - half, 0)
+    high = np.minimum(k + half + 1, len(torque))
+
+    # Differences of running sums: the cost does not depend on the window's width.
+    so_far = np.concatenate([np.zeros((1, 2)), np.cumsum(amount, axis=0)])
+    impulse = so_far[high] - so_far[low]
+    counted = np.concatenate([[0], np.cumsum(real)])
+    loaded = counted[high] > counted[low]
+    return impulse[loaded, 0] / impulse[loaded].sum(axis=1), loaded
+
+
 def _steps(torque: ArrayLike, theta: ArrayLike, timestep: float) -> _Steps:
     """Return the steps of a window, checked."""
     check_number("timestep", timestep, "s", low=0.0, high=LARGEST, strict=True)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from fivebar_sim.arrays import Array, Bools
-from fivebar_sim.metrics import ground
+from fivebar_sim.metrics import ground, load
 from fivebar_sim.metrics.columns import Record
 from fivebar_sim.metrics.tracking import tracking_error
 from fivebar_sim.recording.look import (
@@ -28,8 +28,6 @@ if TYPE_CHECKING:
 
 SHARE_WINDOW = 0.05
 """Width of the window over which the load share is taken [s]."""
-SHARE_FLOOR = 1e-6
-"""Mean |torque| that one motor at least must reach in the window for a share to be drawn [N m]."""
 
 
 class Series(NamedTuple):
@@ -70,7 +68,7 @@ def series(scenario: Scenario, record: Record) -> Iterator[Series]:
     every = np.ones(len(record["time"]), dtype=bool)
     error = tracking_error(record)
     torque = _columns(record, "torque_A", "torque_E")
-    share, loaded = load_share(torque, round(0.5 * SHARE_WINDOW / timestep(record["time"])))
+    share, loaded = load.moving_share(torque, round(0.5 * SHARE_WINDOW / timestep(record["time"])))
     in_torque = getattr(scenario.controller, "drive", "position") == "torque"
 
     yield Series(
@@ -109,28 +107,3 @@ def _torques(
 def _columns(record: Record, *names: str) -> Array:
     """Return columns side by side, (N, len(names))."""
     return np.stack([record[name] for name in names], axis=-1)
-
-
-def load_share(torque: Array, half: int) -> tuple[Array, Bools]:
-    """Return A's share of the absolute torque impulse in a moving window, where there is load.
-
-        share_A = sum |tau_A| / (sum |tau_A| + sum |tau_E|),   over rows k - half ... k + half
-
-    The window is cut off at both ends of the record.
-
-    Args:
-        torque: (tau_A, tau_E) [N m], (N, 2).
-        half: Rows on each side of the window's centre.
-
-    Returns:
-        share_A in [0, 1] of the rows under load, (n,), and which rows those are, (N,). Under load,
-        the mean |tau| of at least one motor reaches `SHARE_FLOOR` in the row's window.
-    """
-    k = np.arange(len(torque))
-    low = np.maximum(k - half, 0)
-    high = np.minimum(k + half + 1, len(torque))
-    # Differences of a running sum: a wide window costs no more than a narrow one.
-    total = np.concatenate([np.zeros((1, 2)), np.cumsum(np.abs(torque), axis=0)])
-    impulse = total[high] - total[low]
-    loaded = impulse.max(axis=1) >= SHARE_FLOOR * (high - low)
-    return impulse[loaded, 0] / impulse[loaded].sum(axis=1), loaded

@@ -10,11 +10,12 @@ import numpy as np
 from fivebar_sim.arrays import Array
 from fivebar_sim.control import Feedback
 from fivebar_sim.files import tables
+from fivebar_sim.metrics import load
 from fivebar_sim.metrics.catalogue import GROUND_KEYS, SHOWN
 from fivebar_sim.metrics.columns import motors
 from fivebar_sim.metrics.limits import Limit, judge
 from fivebar_sim.metrics.tracking import tracking_error
-from fivebar_sim.recording.plots import SHARE_WINDOW, load_share
+from fivebar_sim.recording.plots import SHARE_WINDOW
 from fivebar_sim.runs.stored import StoredRun
 
 PERCENTILE = 95.0
@@ -49,7 +50,7 @@ def share(run: StoredRun) -> Array:
     """Return A's share of the load in a moving window, NaN where there is no load, (N,)."""
     torque = motors(run.record, "torque")
     half = round(0.5 * SHARE_WINDOW / run.scenario.sim.timestep)
-    values, loaded = load_share(torque, half)
+    values, loaded = load.moving_share(torque, half)
     drawn = np.full(len(loaded), np.nan)
     drawn[loaded] = values
     return drawn
