@@ -14,16 +14,17 @@ from fivebar_sim.geometry import MODES, FiveBar, Mode
 from fivebar_sim.kinematics.planar import unit
 from fivebar_sim.workspace.coupler import cut, trace
 from fivebar_sim.workspace.four_bar import FourBar
+from fivebar_sim.workspace.region import AnyMode
 
 BENT = FiveBar(0.05, 0.04, 0.035, 0.07, 0.09, 0.02, 0.5, 0.3)
 MINITAUR = FiveBar.load("minitaur")
-EITHER: list[Mode | None] = [None, (-1, 1), (1, 1)]  # both elbows of side A, and each alone
+EITHER: list[AnyMode] = ["any", (-1, 1), (1, 1)]  # both elbows of side A, and each alone
 
 # law
 
 
 @pytest.mark.parametrize("mode", EITHER)
-def test_boundary_points_are_of_both_sides_and_wherever_nearest_goes(mode: Mode | None) -> None:
+def test_boundary_points_are_of_both_sides_and_wherever_nearest_goes(mode: AnyMode) -> None:
     rng = np.random.default_rng(8)
     stretched = replace(BENT, L6=0.5)
     for leg in (BENT, MINITAUR, any_leg(rng), narrow(rng), stretched, replace(BENT, L6=0.0)):
@@ -40,7 +41,7 @@ def test_boundary_points_are_of_both_sides_and_wherever_nearest_goes(mode: Mode 
         near = workspace.reachable(leg, ring, mode=mode)
         assert not near.all(axis=1).any()
         # of one elbow alone, no more than a thin horn at the end of an arc
-        assert near.any(axis=1).mean() > (0.98 if mode else 1.0 - 1e-9)
+        assert near.any(axis=1).mean() > (0.98 if mode != "any" else 1.0 - 1e-9)
         p = around(leg, rng, 200)
         q = workspace.nearest(leg, p[~workspace.reachable(leg, p, mode=mode)], mode=mode)
         to_chord = [np.inf]
@@ -60,17 +61,17 @@ def test_singular_curves_are_where_the_loop_flips(L6: float, mode: Mode) -> None
     """All their points are singular, and wherever `loop` changes its sign there is a curve."""
     equal = FiveBar(0.05, 0.06, 0.06, 0.045, 0.04, L6, 0.5, 0.3)
     for leg in (replace(BENT, L6=L6), replace(BENT, L3=0.05, L6=L6), equal):
-        curves = np.concatenate(workspace.singular_curves(leg, mode))
+        curves = np.concatenate(workspace.singular_curves(leg, mode=mode))
         sound = workspace.reachable(leg, curves, mode=mode)
         assert sound.mean() > 0.98  # not the ends, on the edge of reach to rounding
-        loop = singularity.distances_at(leg, curves[sound], mode).loop
+        loop = singularity.distances_at(leg, curves[sound], mode=mode).loop
         # the motors of a foot near the edge are off by the square root of rounding
         assert np.abs(loop).max() < 1e-6 * leg.size
         line = np.linspace(-1.1, 1.1, 241) * leg.size
         grid = np.stack(np.meshgrid(line, line), axis=-1)
         inside = workspace.reachable(leg, grid, mode=mode)
         loop = np.full(inside.shape, np.nan)
-        loop[inside] = singularity.distances_at(leg, grid[inside], mode).loop
+        loop[inside] = singularity.distances_at(leg, grid[inside], mode=mode).loop
         flips = grid[:, 1:][loop[:, 1:] * loop[:, :-1] < 0.0]
         to_curve = length(flips[:, None] - curves).min(axis=1)
         assert len(flips) > 20
@@ -82,8 +83,10 @@ def test_singular_curves_are_where_the_loop_flips(L6: float, mode: Mode) -> None
 
 
 def test_equal_coaxial_legs_are_singular_everywhere_in_modes_of_equal_signs() -> None:
-    assert workspace.singular_curves(MINITAUR, (1, 1)) == []
-    assert workspace.singular_curves(MINITAUR, (-1, 1)) == []  # where it only folds at the edges
+    assert workspace.singular_curves(MINITAUR, mode=(1, 1)) == []
+    assert (
+        workspace.singular_curves(MINITAUR, mode=(-1, 1)) == []
+    )  # where it only folds at the edges
 
 
 def test_cut_finds_two_roots_between_two_poses() -> None:

@@ -21,31 +21,32 @@ from extended_legs import (
 from fivebar_sim import kinematics, motion, workspace
 from fivebar_sim.arrays import Array, Bools
 from fivebar_sim.errors import ArgumentError, GeometryError, UnreachableError
-from fivebar_sim.geometry import MODES, FiveBar, Mode
+from fivebar_sim.geometry import MODES, FiveBar
 from fivebar_sim.kinematics.planar import unit
 from fivebar_sim.paths import Line
+from fivebar_sim.workspace.region import AnyMode
 
 BENT = FiveBar(0.05, 0.04, 0.035, 0.07, 0.09, 0.02, 0.5, 0.3)
 MINITAUR = FiveBar.load("minitaur")
-EITHER: list[Mode | None] = [None, (-1, 1), (1, 1)]  # both elbows of side A, and each alone
+EITHER: list[AnyMode] = ["any", (-1, 1), (1, 1)]  # both elbows of side A, and each alone
 
 
-def check_against_search(leg: FiveBar, p: Array, mode: Mode | None) -> Bools:
+def check_against_search(leg: FiveBar, p: Array, mode: AnyMode) -> Bools:
     """Compare all answers for p (n, 2); return where the search found the boundary."""
     ok = workspace.reachable(leg, p, mode=mode)
     q = workspace.nearest(leg, p, mode=mode)
     signed = workspace.distance(leg, p, mode=mode)
     assert workspace.reachable(leg, q, mode=mode).all()
-    modes = MODES if mode is None else [mode]
+    modes = MODES if mode == "any" else [mode]
     solved = kinematics.inverse_all(leg, q)[:, [MODES.index(m) for m in modes]]
     assert np.isfinite(solved).all(axis=-1).any(axis=-1).all()
     np.testing.assert_array_equal(q[ok], p[ok])
     np.testing.assert_array_equal(workspace.nearest(leg, q, mode=mode), q)
     np.testing.assert_array_equal(signed >= 0.0, ok)
-    settled = 1e-13 if mode is None else 2e-7  # see `nearest`
+    settled = 1e-13 if mode == "any" else 2e-7  # see `nearest`
     np.testing.assert_allclose(length(p - q)[~ok], -signed[~ok], rtol=0, atol=settled * leg.size)
 
-    scanned = search(leg, p, ok, (-1, 1) if mode is None else mode[:1])
+    scanned = search(leg, p, ok, (-1, 1) if mode == "any" else mode[:1])
     assert (np.abs(signed) <= scanned + 1e-12 * leg.size).all()  # never farther
     seen = np.isfinite(scanned)
     assert (scanned <= np.abs(signed) + 1e-5 * leg.size)[seen].all()  # never too near
@@ -62,8 +63,8 @@ def test_nearest_and_distance_against_search(draw: Draw) -> None:
     for k in range(9):
         leg = draw(rng)
         mode = EITHER[k % 3]
-        if mode is not None and not workspace.boundary(leg, mode=mode):
-            mode = None  # no foot position has this elbow
+        if mode != "any" and not workspace.boundary(leg, mode=mode):
+            mode = "any"  # no foot position has this elbow
         found += int(check_against_search(leg, around(leg, rng, 25), mode).sum())
     assert found > 9 * 25 * 0.9
 
@@ -71,7 +72,7 @@ def test_nearest_and_distance_against_search(draw: Draw) -> None:
 @pytest.mark.parametrize("leg", CORNER_CASES.values(), ids=CORNER_CASES.keys())
 def test_corner_cases_against_search(leg: FiveBar) -> None:
     rng = np.random.default_rng(3)
-    assert check_against_search(leg, around(leg, rng, 60), None).all()
+    assert check_against_search(leg, around(leg, rng, 60), "any").all()
 
 
 @pytest.mark.parametrize("batch", [(), (1,), (3, 1, 4), (0,)])
@@ -201,8 +202,10 @@ def test_arguments_are_refused(f: Callable[..., object]) -> None:
         with pytest.raises(ArgumentError, match=r"foot must .*shape \(\.\.\., 2\)"):
             f(BENT, foot)
     for leg in (BENT, FiveBar()):
-        with pytest.raises(ArgumentError, match=r"mode must be one of .*, got \(0, 1\)"):
+        with pytest.raises(ArgumentError, match=r"mode must be .any. or one of .*, got \(0, 1\)"):
             f(leg, (0.0, -0.08), mode=(0, 1))
+        with pytest.raises(ArgumentError, match="got None"):  # elsewhere it is the leg's own
+            f(leg, (0.0, -0.08), mode=None)
 
 
 @pytest.mark.parametrize("margin", [-1e-3, np.nan, np.inf, "1"])

@@ -10,6 +10,7 @@ step. Either way `kinematics.inverse_all` accepts the answer.
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -18,6 +19,7 @@ from fivebar_sim.arrays import Array, Bools, as_pairs, at, first_index
 from fivebar_sim.checks import check_number
 from fivebar_sim.errors import ArgumentError
 from fivebar_sim.geometry import MODES, FiveBar, Mode
+from fivebar_sim.kinematics.reach import working_mode
 from fivebar_sim.workspace.extended import Extended, region, to_hip
 from fivebar_sim.workspace.rings import Rings, rings
 from fivebar_sim.workspace.singular import singular_pieces
@@ -25,21 +27,24 @@ from fivebar_sim.workspace.singular import singular_pieces
 FAR = 1e150
 """Coordinates [m] from here on are refused: their squares overflow."""
 
+ANY: Literal["any"] = "any"
+"""All working modes together."""
+AnyMode = Mode | Literal["any"]
+"""A working mode (s_A, s_E), or `ANY`; nowhere else can a mode be more than one."""
+
 ARC = 0.01
 """Step of the arcs in `boundary` [rad]: the chord is within 1.25e-5 of the radius."""
 
 
-def reachable(
-    leg: FiveBar, foot: ArrayLike, *, margin: float = 0.0, mode: Mode | None = None
-) -> Bools:
+def reachable(leg: FiveBar, foot: ArrayLike, *, margin: float = 0.0, mode: AnyMode = ANY) -> Bools:
     """Return where the foot can be put: where `kinematics.inverse_all` gives an answer.
 
     Args:
         leg: The leg.
         foot: F [m], hip frame, (..., 2). NaN and infinity are not reachable.
-        margin: Least distance that the foot must keep from the boundary [m].
-        mode: Working mode that must reach the foot; None for any. With L6 = 0 all modes reach the
-            same; else s_A alone decides.
+        margin: How far from the boundary the foot shall stay at least [m].
+        mode: Working mode in which it shall be reached, or "any". All reach the same where
+            L6 = 0; else s_A alone decides.
 
     Returns:
         Truth values, (...): with a margin, where `distance` is at least the margin.
@@ -58,9 +63,7 @@ def reachable(
     return held
 
 
-def nearest(
-    leg: FiveBar, foot: ArrayLike, *, margin: float = 0.0, mode: Mode | None = None
-) -> Array:
+def nearest(leg: FiveBar, foot: ArrayLike, *, margin: float = 0.0, mode: AnyMode = ANY) -> Array:
     """Return the nearest points that the foot can reach.
 
     A reachable point is returned as it is. Any other is replaced by the nearest point of the
@@ -75,8 +78,8 @@ def nearest(
     Args:
         leg: The leg.
         foot: F [m], hip frame, (..., 2).
-        margin: Least distance that the answer must keep from the boundary [m]; only with L6 = 0.
-        mode: Working mode that must reach the answer; None for any.
+        margin: How far from the boundary the answer shall be at least [m]; only where L6 = 0.
+        mode: Working mode in which the answer shall be reached, or "any".
 
     Returns:
         The nearest reachable points [m], (..., 2).
@@ -105,13 +108,13 @@ def nearest(
     return _by_blocks(solve, _finite(foot), (2,), whole.block)
 
 
-def distance(leg: FiveBar, foot: ArrayLike, *, mode: Mode | None = None) -> Array:
+def distance(leg: FiveBar, foot: ArrayLike, *, mode: AnyMode = ANY) -> Array:
     """Return the distance to the boundary of the workspace: positive inside, negative outside.
 
     Args:
         leg: The leg.
         foot: F [m], hip frame, (..., 2).
-        mode: Working mode whose workspace is meant; None for that of all modes together.
+        mode: Working mode whose workspace is meant; "any" is all together.
 
     Returns:
         Signed distances [m], (...): at least 0 where `reachable`.
@@ -130,7 +133,7 @@ def distance(leg: FiveBar, foot: ArrayLike, *, mode: Mode | None = None) -> Arra
     return _by_blocks(solve, _finite(foot), (), whole.block)
 
 
-def boundary(leg: FiveBar, *, mode: Mode | None = None) -> list[Array]:
+def boundary(leg: FiveBar, *, mode: AnyMode = ANY) -> list[Array]:
     """Return the boundary of the workspace as polylines for drawing.
 
     First the arcs of A's circles, inner first; then with L6 = 0 those of E's circles, or with
@@ -139,7 +142,7 @@ def boundary(leg: FiveBar, *, mode: Mode | None = None) -> list[Array]:
 
     Args:
         leg: The leg.
-        mode: Working mode whose workspace is meant; None for that of all modes together.
+        mode: Working mode whose workspace is meant; "any" is all together.
 
     Returns:
         Polylines [m], each (n, 2), n at least 2. Their points are on the boundary; neighbours are
@@ -149,7 +152,7 @@ def boundary(leg: FiveBar, *, mode: Mode | None = None) -> list[Array]:
     return _region(leg, 0.0, mode).boundary(ARC)
 
 
-def singular_curves(leg: FiveBar, mode: Mode | None = None) -> list[Array]:
+def singular_curves(leg: FiveBar, *, mode: Mode | None = None) -> list[Array]:
     """Return the foot positions at which B, C and D are in line, or B = D, as polylines.
 
     There the foot is free to move while the motors stand still (a parallel singularity). L2 and
@@ -170,21 +173,19 @@ def singular_curves(leg: FiveBar, mode: Mode | None = None) -> list[Array]:
     Raises:
         ArgumentError: Unknown mode.
     """
-    mode = leg.mode if mode is None else mode
-    _check(0.0, mode)
-    return [to_hip(leg, piece) for piece in singular_pieces(leg, mode)]
+    return [to_hip(leg, piece) for piece in singular_pieces(leg, working_mode(leg, mode))]
 
 
-def _check(margin: float, mode: Mode | None) -> None:
+def _check(margin: float, mode: AnyMode) -> None:
     check_number("margin", margin, "m", low=0.0)
-    if mode is not None and mode not in MODES:
-        raise ArgumentError(f"mode must be one of {MODES}, got {mode!r}")
+    if mode not in (ANY, *MODES):
+        raise ArgumentError(f"mode must be {ANY!r} or one of {MODES}, got {mode!r}")
 
 
-def _region(leg: FiveBar, margin: float, mode: Mode | None) -> Rings | Extended:
+def _region(leg: FiveBar, margin: float, mode: AnyMode) -> Rings | Extended:
     if leg.L6 == 0.0:
         return rings(leg, margin)
-    return region(leg, 0 if mode is None else mode[0])
+    return region(leg, 0 if mode == ANY else mode[0])
 
 
 def _finite(foot: ArrayLike) -> Array:
