@@ -42,8 +42,8 @@ def assemblies(leg: FiveBar, foot: Array, mode: Mode) -> Array:
 @pytest.mark.parametrize("mode", MODES)
 def test_foot_and_angles_name_one_aspect(batch: tuple[int, ...], mode: Mode, assembly: int) -> None:
     foot, theta = sample(RIGID, batch, mode, assembly)
-    one = aspect_at(RIGID, foot, mode)
-    other = aspect(RIGID, theta, assembly)
+    one = aspect_at(RIGID, foot, mode=mode)
+    other = aspect(RIGID, theta, assembly=assembly)
     for each, again in zip(one, other, strict=True):
         np.testing.assert_array_equal(each, again)
         assert np.shape(each) == batch
@@ -67,16 +67,16 @@ def test_a_walk_that_meets_no_singularity_stays_in_its_aspect(
         q = walks[clear, -1]
         if clear.any():
             # too near a singularity for the grid: no number, so no aspect is said to be shared
-            told = (aspect_at(leg, p, mode).part > 0) & (aspect_at(leg, q, mode).part > 0)
+            told = (aspect_at(leg, p, mode=mode).part > 0) & (aspect_at(leg, q, mode=mode).part > 0)
             assert told.mean() > 0.99
-            assert same_aspect(leg, p, q, mode)[told].all()
+            assert same_aspect(leg, p, q, mode=mode)[told].all()
             stayed += int(clear.sum())
     assert stayed > 40
 
 
 def test_other_assembly_is_another_aspect() -> None:
     feet = [sample(RIGID, (20,), (1, 1), assembly)[0] for assembly in (-1, 1)]
-    assert not same_aspect(RIGID, feet[0][:, None], feet[1], (1, 1)).any()
+    assert not same_aspect(RIGID, feet[0][:, None], feet[1], mode=(1, 1)).any()
 
 
 # oracle
@@ -97,7 +97,7 @@ def test_parts_are_those_of_the_foot_plane(leg: FiveBar, mode: Mode) -> None:
             nodes = foot[label == k]
             if len(nodes) < 60:
                 continue
-            here = aspect_at(leg, nodes[:: len(nodes) // 40], mode)
+            here = aspect_at(leg, nodes[:: len(nodes) // 40], mode=mode)
             (part,) = set(here.part.tolist()) - {0}
             seen.append((assembly, part))
     assert len(set(seen)) == len(seen)
@@ -147,16 +147,16 @@ def test_one_triple_two_aspects_in_a_workspace_of_two_parts() -> None:
             triple = assemblies(TWO_PARTS, foot, mode)
             feet.append(foot[(triple == 1) & kept_clear(foot, triple, mode)])
             assert len(feet[-1]) > 5
-        assert not same_aspect(TWO_PARTS, feet[0][:, None], feet[1], mode).any()
+        assert not same_aspect(TWO_PARTS, feet[0][:, None], feet[1], mode=mode).any()
         for part in feet:
-            assert same_aspect(TWO_PARTS, part[0], part, mode).sum() > 1
+            assert same_aspect(TWO_PARTS, part[0], part, mode=mode).sum() > 1
 
 
 def kept_clear(foot: Array, triple: Array, mode: Mode) -> Array:
     """Return which feet are within reach and 2 mm from every singularity."""
     clear = np.zeros(len(foot), dtype=bool)
     ok = triple != 0
-    clear[ok] = (np.abs(distances_at(TWO_PARTS, foot[ok], mode)) > 0.002).all(axis=0)
+    clear[ok] = (np.abs(distances_at(TWO_PARTS, foot[ok], mode=mode)) > 0.002).all(axis=0)
     return clear
 
 
@@ -168,15 +168,15 @@ def test_one_triple_two_aspects_in_one_workspace() -> None:
     line = np.linspace(-1.0, 1.0, 201) * CLASSIC.size
     foot = np.stack(np.meshgrid(line, line, indexing="ij"), axis=-1)
     foot = foot[assemblies(CLASSIC, foot, (-1, 1)) == 1]
-    count = np.bincount(aspect_at(CLASSIC, foot, (-1, 1)).part)
+    count = np.bincount(aspect_at(CLASSIC, foot, mode=(-1, 1)).part)
     assert count[1] > count[2] > 0  # the larger comes first
 
 
 def test_coaxial_leg_walks_all_around_its_motors() -> None:
     p = 0.25 * unit(0.3)
     q = 0.25 * unit(np.linspace(-3.0, 3.0, 13))
-    assert same_aspect(COAXIAL, p, q, (-1, 1)).all()
-    assert aspect_at(COAXIAL, q, (-1, 1)).part.tolist() == [1] * 13
+    assert same_aspect(COAXIAL, p, q, mode=(-1, 1)).all()
+    assert aspect_at(COAXIAL, q, mode=(-1, 1)).part.tolist() == [1] * 13
 
 
 def test_too_coarse_a_grid_tells_nothing() -> None:
@@ -202,11 +202,11 @@ def test_result_is_the_callers_own() -> None:
 def test_singular_poses_belong_to_no_aspect() -> None:
     both_alike = FiveBar(0.09, 0.162, 0.162, 0.09, 0.0)  # knees on one side: B is on D
     with pytest.raises(SingularError, match=r"must not be 0 m, got .*, loop 0\.0e\+00 m$") as info:
-        aspect_at(both_alike, (0.0, 0.2), (1, 1))
+        aspect_at(both_alike, (0.0, 0.2), mode=(1, 1))
     assert info.value.index == ()
     leg = FiveBar(0.25, 0.5, 0.75, 0.375, 0.5)
     with pytest.raises(SingularError, match=r"side_A .* m at index \(1,\)") as info:
-        aspect_at(leg, [(-0.1, -0.5), (-0.25, -0.75)], (1, 1))
+        aspect_at(leg, [(-0.1, -0.5), (-0.25, -0.75)], mode=(1, 1))
     assert info.value.index == (1,)
     line = FiveBar(0.25, 0.5, 0.5, 0.25, 0.5)
     with pytest.raises(SingularError):
@@ -223,7 +223,7 @@ def test_wrong_arguments_are_refused() -> None:
     with pytest.raises(ArgumentError, match=r"p and q must broadcast, got shapes \(3, 2\)"):
         same_aspect(RIGID, foot, foot[:2])
     with pytest.raises(ArgumentError, match="mode must be one of"):
-        aspect_at(RIGID, foot, (1, 0))
+        aspect_at(RIGID, foot, mode=(1, 0))
     for cells in (2, 10.0, True, "120", [3]):
         with pytest.raises(ArgumentError, match="cells must be a whole number above 2"):
             aspect_at(RIGID, foot, cells=cells)  # pyright: ignore[reportArgumentType]

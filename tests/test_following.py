@@ -115,7 +115,7 @@ def test_from_the_edge_of_reach_the_leg_goes_on_in_the_nearest_mode(
     assert np.abs(np.diff(came.theta, axis=0)).max() < 0.01
 
     time = np.linspace(0.0, 1.0, 401)
-    report = path_report(CLASSIC, foot, time, came.mode)
+    report = path_report(CLASSIC, foot, time, mode=came.mode)
     assert report.side_A.point == 200
     assert abs(report.side_A.distance) < 1e-9
     assert report.side_A.crossing == pytest.approx(0.5, abs=1e-9)
@@ -182,7 +182,7 @@ def test_one_point_is_a_path() -> None:
 
 def test_coaxial_leg_with_both_knees_on_one_side_is_always_singular() -> None:
     foot = line((0.2, 0.0), (0.2, 0.1), 5)
-    report = path_report(FiveBar(0.09, 0.162, 0.162, 0.09, 0.0), foot, range(5), (1, 1))
+    report = path_report(FiveBar(0.09, 0.162, 0.162, 0.09, 0.0), foot, range(5), mode=(1, 1))
     assert report.loop.distance == 0.0
     assert report.loop.crossing == 0.0
 
@@ -209,7 +209,7 @@ def test_points_out_of_reach_are_named() -> None:
     for call in (
         lambda: follow(CLASSIC, path, theta0),
         lambda: path_report(CLASSIC, path, TURN),
-        lambda: path_report(CLASSIC, path, TURN, np.broadcast_to((1, -1), (201, 2))),
+        lambda: path_report(CLASSIC, path, TURN, mode=np.broadcast_to((1, -1), (201, 2))),
     ):
         with pytest.raises(UnreachableError, match=r"out of reach: \|AF\| .* at index \(7,\)") as e:
             call()
@@ -239,6 +239,6 @@ def test_wrong_arguments_are_refused() -> None:
     with pytest.raises(ArgumentError, match="time must be numbers"):
         path_report(CLASSIC, ELLIPSE, ["a"] * 201)
     with pytest.raises(ArgumentError, match=r"mode must be one of .*, got \(0, 1\)"):
-        path_report(CLASSIC, ELLIPSE, TURN, (0, 1))
+        path_report(CLASSIC, ELLIPSE, TURN, mode=(0, 1))
     with pytest.raises(ArgumentError, match=r"mode must have shape \(2,\) or \(201, 2\)"):
-        path_report(CLASSIC, ELLIPSE, TURN, (1, 1, 1))
+        path_report(CLASSIC, ELLIPSE, TURN, mode=(1, 1, 1))

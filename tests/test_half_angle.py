@@ -65,7 +65,7 @@ def test_two_routes_agree_over_a_million_points() -> None:
             ok = np.isfinite(every[:, k, 0])
             p = foot[ok]
             theta = every[ok, k]
-            other = kinematics.inverse_half_angle(leg, p, mode)
+            other = kinematics.inverse_half_angle(leg, p, mode=mode)
             assert ((-np.pi < other) & (other <= np.pi)).all()
             error = np.abs(wrap(other - theta))
             assert (error <= bound(leg, p, theta)).all()
@@ -73,7 +73,7 @@ def test_two_routes_agree_over_a_million_points() -> None:
             seen = seen + int(ok.sum())
             count = f"^{1000 - ok.sum()} of 1000 points"
             with pytest.raises(UnreachableError, match=count):
-                kinematics.inverse_half_angle(leg, foot, mode)
+                kinematics.inverse_half_angle(leg, foot, mode=mode)
     assert seen > 1_000_000
     assert worst < 1e-10
 
@@ -157,7 +157,7 @@ def test_full_stretch_and_fold_along_the_base_line(s: int, zero: float) -> None:
 def test_stretched_leg_is_never_at_minus_pi() -> None:
     leg = FiveBar(0.25, 0.5, 0.5, 0.25, 0.0)
     for z in (0.0, -0.0, -1e-20, -1e-300):
-        theta = [kinematics.inverse_half_angle(leg, (-0.75, z), mode) for mode in MODES]
+        theta = [kinematics.inverse_half_angle(leg, (-0.75, z), mode=mode) for mode in MODES]
         np.testing.assert_array_equal(theta, np.pi)
 
 
@@ -168,7 +168,7 @@ def test_foot_on_the_base_line() -> None:
         X = x + 0.5 * leg.L5
         alpha = math.acos((X**2 + leg.L1**2 - leg.L2**2) / (2.0 * leg.L1 * X))
         for mode in MODES:
-            theta = kinematics.inverse_half_angle(leg, (x, 0.0), mode)
+            theta = kinematics.inverse_half_angle(leg, (x, 0.0), mode=mode)
             assert theta[0] == pytest.approx(mode[0] * alpha, abs=1e-14)
             assert np.abs(theta - kinematics.inverse(leg, (x, 0.0), mode)).max() < 1e-14
 
@@ -214,7 +214,7 @@ def test_refusals_are_those_of_inverse(leg: FiveBar, foot: Any, mode: Any) -> No
     raised = []
     for f in (kinematics.inverse, kinematics.inverse_half_angle):
         with pytest.raises(FiveBarError) as info:
-            f(leg, foot, mode)
+            f(leg, foot, mode=mode)
         raised.append((info.type, str(info.value), getattr(info.value, "index", None)))
     assert raised[0] == raised[1]
 

@@ -88,14 +88,14 @@ def test_round_trips_over_full_circles(kind: type[SideStep] | type[Steering]) ->
             for a, s in np.ndindex(2, 2):
                 this = good & (assembly == signs[a]) & (np.sign(u) == signs[s])
                 theta3 = np.column_stack([full_circle(int(this.sum())), theta[this]])
-                foot = hip.forward(h, theta3, signs[a])
-                again = hip.inverse(h, foot, mode, signs[s])
+                foot = hip.forward(h, theta3, assembly=signs[a])
+                again = hip.inverse(h, foot, mode=mode, side=signs[s])
                 error = np.abs(wrap(again - theta3))
                 v = np.abs(u[this])
                 assert ((-np.pi < again) & (again <= np.pi)).all()
                 assert (error[:, 0] <= 8.0 * EPS * (1.0 + abs(h.across) / v)).all()
                 assert (error[v > 0.05 * leg.size] <= 1e-12).all()
-                drift = np.linalg.norm(hip.forward(h, again, signs[a]) - foot, axis=-1)
+                drift = np.linalg.norm(hip.forward(h, again, assembly=signs[a]) - foot, axis=-1)
                 assert (drift <= 1e-12 * leg.size).all()
                 seen[j, a, s] += this.sum()
     assert seen.min() > 200
@@ -137,10 +137,11 @@ def test_jacobian_is_the_slope_of_forward(h: Hip, batch: tuple[int, ...], assemb
     step = 3e-6
     theta3 = np.concatenate([full_circle(*batch)[..., None], theta], axis=-1)
     slopes = [
-        hip.forward(h, theta3 + step * e, assembly) - hip.forward(h, theta3 - step * e, assembly)
+        hip.forward(h, theta3 + step * e, assembly=assembly)
+        - hip.forward(h, theta3 - step * e, assembly=assembly)
         for e in np.eye(3)
     ]
-    J = hip.jacobian(h, theta3, assembly)
+    J = hip.jacobian(h, theta3, assembly=assembly)
     assert J.shape == (*batch, 3, 3)
     # step^2 F'''/6 with F''' below 6000 |J| this far from singular; eps size / step is 1e-11
     expected = np.stack(slopes, axis=-1) / (2.0 * step)

@@ -194,11 +194,11 @@ def test_right_angled_pose_by_hand() -> None:
     E = (math.pi, 2.0 * a - math.pi)
     np.testing.assert_allclose(every, [[x, z] for x in A for z in E], rtol=0, atol=1e-15)
     assert every[0, 1] == every[2, 1] == math.pi
-    p = kinematics.closed_points(RIGHT, every[1], -1)
+    p = kinematics.closed_points(RIGHT, every[1], assembly=-1)
     np.testing.assert_allclose(p.B, (-0.0384, -0.0288), rtol=1e-14)
     np.testing.assert_allclose(p.F, (0.0, -0.04), rtol=0, atol=1e-16)
     np.testing.assert_allclose(
-        kinematics.passive(RIGHT, every[1], -1), (corner, -corner), rtol=1e-14
+        kinematics.passive(RIGHT, every[1], assembly=-1), (corner, -corner), rtol=1e-14
     )
     assert kinematics.branch(RIGHT, p) == (-1, 1, -1)
     with pytest.raises(LoopOpenError, match=r"\|BD\| must be above 0"):  # knees inwards: B on D
@@ -295,7 +295,7 @@ def test_arguments_are_refused() -> None:
             kinematics.inverse(RIGHT, foot, mode)  # pyright: ignore[reportArgumentType]
     for f in (kinematics.forward, kinematics.passive, kinematics.closed_points):
         with pytest.raises(ArgumentError, match="assembly must be -1 or 1, got 0"):
-            f(RIGHT, theta, 0)
+            f(RIGHT, theta, assembly=0)
     for f in (kinematics.inverse, kinematics.inverse_all, kinematics.forward, kinematics.passive):
         for x in (1.0, (0.0, 0.0, 0.0), [[1.0], [2.0]], "ab", None, [[1.0, 2.0], [3.0]]):
             with pytest.raises(ArgumentError, match=r"(foot|theta) must .*\(\.\.\., 2\)"):

@@ -234,5 +234,5 @@ def test_message_out_of_reach_has_the_numbers_of_the_side_that_fails(
             f"{sum(ends):g}] m, got {got:g} m for the foot at ({x:g}, {z:g}) m"
         )
         for ask in (kinematics.inverse, kinematics.inverse_half_angle):
-            assert refused(UnreachableError, lambda: ask(leg, (x, z), mode)) == wanted  # noqa: B023
+            assert refused(UnreachableError, lambda: ask(leg, (x, z), mode=mode)) == wanted  # noqa: B023
     assert min(seen.values()) > 3

@@ -43,7 +43,7 @@ def test_joint_motion_is_the_slope_of_inverse(batch: tuple[int, ...], mode: Mode
     h = 1e-5
     v, a = np.random.default_rng(8).uniform(-0.1, 0.1, (2, *foot.shape))
     now, after, before = (
-        kinematics.joint_motion(RIGID, foot + v * t + a * t**2 / 2, v + a * t, a, mode)
+        kinematics.joint_motion(RIGID, foot + v * t + a * t**2 / 2, v + a * t, a, mode=mode)
         for t in (0.0, h, -h)
     )
     knees = kinematics.passive(RIGID, theta)

@@ -46,7 +46,7 @@ def test_axes_are_orthogonal_and_make_up_J(
 ) -> None:
     theta = sample(RIGID, batch, mode, assembly)[1]
     J = kinematics.jacobian(RIGID, theta, assembly)
-    s, u = quality.velocity_ellipse(RIGID, theta, assembly)
+    s, u = quality.velocity_ellipse(RIGID, theta, assembly=assembly)
     assert s.shape == (*batch, 2)
     assert u.shape == (*batch, 2, 2)
     assert (s[..., 0] >= s[..., 1]).all()
@@ -55,12 +55,16 @@ def test_axes_are_orthogonal_and_make_up_J(
     JJt = np.einsum("...ik,...jk->...ij", J, J)
     again = np.einsum("...ki,...k,...kj->...ij", u, s**2, u)
     np.testing.assert_allclose(again, JJt, rtol=0, atol=1e-15 * np.abs(JJt).max() * 4)
-    det = quality.determinant(RIGID, theta, assembly)
+    det = quality.determinant(RIGID, theta, assembly=assembly)
     np.testing.assert_array_equal(np.sign(det), mode[0] * mode[1] * assembly)
     np.testing.assert_allclose(det, np.linalg.det(J), rtol=1e-12)
     np.testing.assert_allclose(s.prod(axis=-1), np.abs(det), rtol=1e-14)
-    np.testing.assert_array_equal(quality.manipulability(RIGID, theta, assembly), np.abs(det))
-    np.testing.assert_array_equal(quality.condition(RIGID, theta, assembly), s[..., 0] / s[..., 1])
+    np.testing.assert_array_equal(
+        quality.manipulability(RIGID, theta, assembly=assembly), np.abs(det)
+    )
+    np.testing.assert_array_equal(
+        quality.condition(RIGID, theta, assembly=assembly), s[..., 0] / s[..., 1]
+    )
 
 
 @pytest.mark.parametrize("batch", BATCHES)
@@ -103,16 +107,16 @@ def test_transmission_angles_make_up_the_determinant(rng: np.random.Generator) -
         B, D = kinematics.knees(leg, theta)
         d = lengths(D - B)
         theta = theta[(d > 1.01 * abs(leg.L2 - leg.L3)) & (d < 0.99 * (leg.L2 + leg.L3))]
-        mu = quality.transmission_angles(leg, theta, 1)
+        mu = quality.transmission_angles(leg, theta, assembly=1)
         rho = np.hypot(*leg.foot_offset)
         sines = np.sin(mu.B) * np.sin(mu.D) / np.sin(mu.C)
-        det = quality.manipulability(leg, theta, 1)
+        det = quality.manipulability(leg, theta, assembly=1)
         np.testing.assert_allclose(
             det, leg.L1 * leg.L4 * rho / leg.L2 * sines, rtol=1e-10, atol=1e-16
         )
         sines = [np.sin(mu.B), np.sin(mu.D), np.sin(mu.C)]
         shorter = [min(leg.L1, rho), min(leg.L4, leg.L3), min(leg.L2, leg.L3)]
-        expected = np.abs(distances(leg, theta, 1))
+        expected = np.abs(distances(leg, theta, assembly=1))
         np.testing.assert_allclose(np.array(sines).T * shorter, expected.T, rtol=0, atol=1e-15)
 
 
@@ -143,7 +147,7 @@ def test_determinant_is_that_of_the_slopes(mode: Mode, assembly: int) -> None:
     h = 1e-6
     steps = [kinematics.forward(RIGID, theta + h * e, assembly) for e in (*np.eye(2), *-np.eye(2))]
     slopes = cross(steps[0] - steps[2], steps[1] - steps[3]) / (2.0 * h) ** 2
-    det = quality.determinant(RIGID, theta, assembly)
+    det = quality.determinant(RIGID, theta, assembly=assembly)
     # rounding eps size / h is 1e-11 of J ~ 0.1; h^2 C''' is less
     np.testing.assert_allclose(slopes, det, rtol=0, atol=1e-9 * np.abs(det).max())
 
@@ -208,14 +212,14 @@ def test_right_angled_pose_by_hand() -> None:
 
 def test_stretched_side_has_an_infinite_force() -> None:
     theta, assembly = stretched_pose()
-    s, u = quality.velocity_ellipse(STRETCHED, theta, assembly)
+    s, u = quality.velocity_ellipse(STRETCHED, theta, assembly=assembly)
     assert s[1] == 0.0 < s[0]
     np.testing.assert_allclose(np.abs(u[1]), (0.0, 1.0), rtol=0, atol=1e-14)  # along A, B, C
-    f = quality.force_ellipse(STRETCHED, theta, assembly)
+    f = quality.force_ellipse(STRETCHED, theta, assembly=assembly)
     assert f.semi_axes.tolist() == [1.0 / s[0], math.inf]
-    assert quality.condition(STRETCHED, theta, assembly) == math.inf
-    assert quality.manipulability(STRETCHED, theta, assembly) < 1e-15
-    mu = quality.transmission_angles(STRETCHED, theta, assembly)
+    assert quality.condition(STRETCHED, theta, assembly=assembly) == math.inf
+    assert quality.manipulability(STRETCHED, theta, assembly=assembly) < 1e-15
+    mu = quality.transmission_angles(STRETCHED, theta, assembly=assembly)
     assert mu.B == pytest.approx(np.pi, abs=1e-14)
     assert mu.deviation.B == pytest.approx(np.pi / 2.0, abs=1e-14)
 
@@ -226,18 +230,20 @@ def test_folded_side_has_an_infinite_force() -> None:
     theta = np.array([-0.5 * np.pi, theta[1]])
     feet = np.array([kinematics.forward(leg, theta, s) for s in (-1, 1)])
     assembly = (-1, 1)[int(np.argmin(lengths(feet - (-0.25, 0.25))))]
-    assert quality.condition(leg, theta, assembly) == math.inf
-    assert quality.transmission_angles(leg, theta, assembly).B == pytest.approx(0.0, abs=1e-14)
+    assert quality.condition(leg, theta, assembly=assembly) == math.inf
+    assert quality.transmission_angles(leg, theta, assembly=assembly).B == pytest.approx(
+        0.0, abs=1e-14
+    )
 
 
 def test_both_sides_stretched_has_no_velocity() -> None:
     """J is zero but for rounding: nothing moves the foot, and everything holds it."""
     leg = FiveBar(0.1, 0.2, 0.2, 0.1, 0.3)  # C at the apex of an equilateral triangle
     theta = np.array([-np.pi / 3.0, -2.0 * np.pi / 3.0])
-    s = quality.velocity_ellipse(leg, theta, -1).semi_axes
+    s = quality.velocity_ellipse(leg, theta, assembly=-1).semi_axes
     np.testing.assert_array_equal(s, 0.0)
-    np.testing.assert_array_equal(quality.force_ellipse(leg, theta, -1).semi_axes, np.inf)
-    assert quality.condition(leg, theta, -1) == math.inf
+    np.testing.assert_array_equal(quality.force_ellipse(leg, theta, assembly=-1).semi_axes, np.inf)
+    assert quality.condition(leg, theta, assembly=-1) == math.inf
 
 
 def test_flat_loop_has_transmission_angles_and_nothing_else() -> None:
@@ -259,9 +265,9 @@ def test_flat_loop_has_transmission_angles_and_nothing_else() -> None:
 def test_nothing_is_ever_nan(rng: np.random.Generator) -> None:
     theta = np.array([stretched_pose()[0], (0.3, 0.4), (-1.0, 2.0)])
     for function in (quality.condition, quality.determinant):
-        assert not np.isnan(function(STRETCHED, theta, -1)).any()
+        assert not np.isnan(function(STRETCHED, theta, assembly=-1)).any()
     for function in (quality.velocity_ellipse, quality.force_ellipse):
-        assert not any(np.isnan(each).any() for each in function(STRETCHED, theta, -1))
+        assert not any(np.isnan(each).any() for each in function(STRETCHED, theta, assembly=-1))
 
 
 # refusal
@@ -274,7 +280,7 @@ def test_open_loops_and_wrong_arguments_are_refused() -> None:
         with pytest.raises(LoopOpenError):
             function(RIGHT, (math.nan, 0.0))
         with pytest.raises(ArgumentError, match="assembly must be -1 or 1, got 2"):
-            function(RIGHT, (-1.85, -1.28), 2)
+            function(RIGHT, (-1.85, -1.28), assembly=2)
         with pytest.raises(ArgumentError, match="theta must have shape"):
             function(RIGHT, 1.0)
     coaxial = FiveBar(0.25, 0.25, 0.25, 0.25, 0.0)

@@ -57,11 +57,11 @@ def product(leg: FiveBar, d: Distances) -> Array:
 @pytest.mark.parametrize("mode", MODES)
 def test_signs_are_the_modes(batch: tuple[int, ...], mode: Mode, assembly: int) -> None:
     foot, theta = sample(RIGID, batch, mode, assembly)
-    d = distances(RIGID, theta, assembly)
+    d = distances(RIGID, theta, assembly=assembly)
     assert all(np.shape(each) == batch for each in d)
     np.testing.assert_array_equal(signs(RIGID, d), np.broadcast_to((*mode, assembly), (*batch, 3)))
     # eps size / sine: the samples' sines are above 0.4
-    np.testing.assert_allclose(distances_at(RIGID, foot, mode), d, rtol=0, atol=1e-15)
+    np.testing.assert_allclose(distances_at(RIGID, foot, mode=mode), d, rtol=0, atol=1e-15)
 
 
 def test_determinants_of_the_loop_equation(rng: np.random.Generator) -> None:
@@ -69,8 +69,8 @@ def test_determinants_of_the_loop_equation(rng: np.random.Generator) -> None:
     for _ in range(200):
         leg = random_leg(rng)
         theta, assembly = random_poses(rng, leg, 50)
-        d = distances(leg, theta, assembly)
-        p = kinematics.closed_points(leg, theta, assembly)
+        d = distances(leg, theta, assembly=assembly)
+        p = kinematics.closed_points(leg, theta, assembly=assembly)
         A, E = kinematics.bases(leg)
         AB = p.B - A
         ED = p.D - E
@@ -91,8 +91,8 @@ def test_distance_is_shorter_link_times_sine(rng: np.random.Generator) -> None:
     for _ in range(50):
         leg = random_leg(rng)
         theta, assembly = random_poses(rng, leg, 20)
-        d = distances(leg, theta, assembly)
-        p = kinematics.closed_points(leg, theta, assembly)
+        d = distances(leg, theta, assembly=assembly)
+        p = kinematics.closed_points(leg, theta, assembly=assembly)
         A, E = kinematics.bases(leg)
         pairs = ((A, p.B, p.F), (E, p.D, p.C_right), (p.B, p.C_left, p.D))
         for each, (start, knee, end) in zip(d, pairs, strict=True):
@@ -109,7 +109,7 @@ def test_distance_is_shorter_link_times_sine(rng: np.random.Generator) -> None:
 @pytest.mark.parametrize("mode", MODES)
 def test_determinant_of_slopes_is_product_of_distances(mode: Mode, assembly: int) -> None:
     theta = sample(RIGID, (30,), mode, assembly)[1]
-    det = product(RIGID, distances(RIGID, theta, assembly))
+    det = product(RIGID, distances(RIGID, theta, assembly=assembly))
     slopes = slope_determinant(RIGID, theta, assembly)
     # rounding eps size / h is 1e-11 of J ~ 0.1; h^2 C''' is less
     np.testing.assert_allclose(slopes, det, rtol=0, atol=1e-9 * np.abs(det).max())
@@ -128,7 +128,7 @@ def test_signs_change_where_the_determinant_of_slopes_does(rng: np.random.Genera
         B, D = kinematics.knees(leg, path)
         gap = np.hypot(*(D - B).T)
         path = path[(gap > abs(leg.L2 - leg.L3) + 1e-4) & (gap < leg.L2 + leg.L3 - 1e-4)]
-        d = distances(leg, path, assembly)
+        d = distances(leg, path, assembly=assembly)
         clear = (np.abs(d) > 1e-3 * np.array(shorter_links(leg))[:, None]).all(axis=0)
         sign = signs(leg, d).prod(axis=-1)[clear]
         np.testing.assert_array_equal(
@@ -187,7 +187,7 @@ def test_batch_is_a_plain_loop_to_the_last_bit() -> None:
     ],
 )
 def test_stretched_and_folded_sides(mode: Mode, foot: tuple[float, float], zero: str) -> None:
-    d = distances_at(DYADIC, foot, mode)
+    d = distances_at(DYADIC, foot, mode=mode)
     expected = [s * (name != zero) for s, name in zip(np.sign(d), d._fields, strict=True)]
     assert signs(DYADIC, d).tolist() == expected
     assert abs(getattr(d, zero)) < 1e-15
@@ -199,7 +199,7 @@ def test_stretched_side_by_its_angles() -> None:
     found = []
     for assembly in (-1, 1):
         on = abs(kinematics.forward(DYADIC, theta, assembly)[1] + 0.75) < 1e-15
-        assert (abs(distances(DYADIC, theta, assembly).side_A) < 1e-15) == on
+        assert (abs(distances(DYADIC, theta, assembly=assembly).side_A) < 1e-15) == on
         assert (abs(slope_determinant(DYADIC, theta, assembly)) < 1e-9) == on
         found.append(on)
     assert sorted(found) == [False, True]
@@ -208,9 +208,9 @@ def test_stretched_side_by_its_angles() -> None:
 @pytest.mark.parametrize("assembly", [-1, 1])
 def test_flat_loop_stretched_and_folded(assembly: int) -> None:
     line = FiveBar(0.25, 0.5, 0.5, 0.25, 0.5)  # at (pi, 0) |BD| = 1 m = L2 + L3
-    assert distances(line, (math.pi, 0.0), assembly).loop == pytest.approx(0.0, abs=1e-16)
+    assert distances(line, (math.pi, 0.0), assembly=assembly).loop == pytest.approx(0.0, abs=1e-16)
     folded = FiveBar(0.125, 0.75, 0.5, 0.125, 0.5)  # at (0, pi) |BD| = 0.25 m = L2 - L3
-    d = distances(folded, (0.0, math.pi), assembly)
+    d = distances(folded, (0.0, math.pi), assembly=assembly)
     assert d.loop == pytest.approx(0.0, abs=1e-16)
     assert signs(folded, d)[2] == 0
 
@@ -219,7 +219,7 @@ def test_B_on_D_is_singular_wherever_C_is() -> None:
     """The height of C over BD would be a link long; the determinant and the distance are zero."""
     leg = FiveBar(0.25, 0.25, 0.25, 0.25, 0.0)
     foot = [(0.0, -0.25), (0.2, 0.1)]
-    d = distances_at(leg, foot, (1, 1))
+    d = distances_at(leg, foot, mode=(1, 1))
     np.testing.assert_array_equal(d.loop, 0.0)
     np.testing.assert_array_equal(d.side_A, d.side_E)
     assert (d.side_A > 0.02).all()
@@ -245,8 +245,8 @@ def test_knee_in_line_is_no_singularity_of_an_extended_foot() -> None:
     C = kinematics.bases(bare)[0] + 0.09 * unit(-0.6)  # |AC| = L1 + L2
     theta = kinematics.inverse(bare, C, (1, 1))
     assembly = int(kinematics.branch(bare, points_at(bare, C, theta)).assembly)
-    d = distances(leg, theta, assembly)
-    d_bare = distances(bare, theta, assembly)
+    d = distances(leg, theta, assembly=assembly)
+    d_bare = distances(bare, theta, assembly=assembly)
     assert abs(d_bare.side_A) < 1e-7 < 0.01 < abs(d.side_A)
     assert abs(slope_determinant(bare, theta, assembly)) < 1e-8
     det = product(leg, d)
@@ -288,8 +288,8 @@ def test_open_unreachable_and_wrong_arguments_are_refused() -> None:
         distances_at(RIGHT, [(0.0, -0.04), (0.0, math.nan)])
     assert unreachable.value.index == (1,)
     with pytest.raises(ArgumentError, match="mode must be one of"):
-        distances_at(RIGHT, (0.0, -0.04), (0, 1))
+        distances_at(RIGHT, (0.0, -0.04), mode=(0, 1))
     with pytest.raises(ArgumentError, match="assembly must be -1 or 1, got 0"):
-        distances(RIGHT, (-1.85, -1.28), 0)
+        distances(RIGHT, (-1.85, -1.28), assembly=0)
     with pytest.raises(ArgumentError, match=r"foot must have shape \(\.\.\., 2\)"):
         distances_at(RIGHT, (0.0, 0.0, 0.0))

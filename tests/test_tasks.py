@@ -194,7 +194,7 @@ def test_another_working_mode_is_a_flip(mode: tuple[int, int]) -> None:
     theta = kinematics.inverse(leg, foot, mode)
     for assembly in (-1, 1):
         if np.allclose(kinematics.forward(leg, theta, assembly), foot):
-            q = np.stack([theta, kinematics.passive(leg, theta, assembly)]).T.ravel()
+            q = np.stack([theta, kinematics.passive(leg, theta, assembly=assembly)]).T.ravel()
             assert reason(at(leg, q)) == "flip"
 
 

@@ -86,7 +86,7 @@ class _Atlas(NamedTuple):
 
 
 def aspect(
-    leg: FiveBar, theta: ArrayLike, assembly: int | None = None, *, cells: int = CELLS
+    leg: FiveBar, theta: ArrayLike, *, assembly: int | None = None, cells: int = CELLS
 ) -> Aspect:
     """Return the aspects of closed poses.
 
@@ -101,11 +101,11 @@ def aspect(
         SingularError: Where the pose is singular to rounding: it belongs to no aspect.
         ArgumentError: A wrong shape or assembly mode, or unless cells is a whole number above 2.
     """
-    return _aspect(leg, closed_points(leg, theta, assembly), cells)
+    return _aspect(leg, closed_points(leg, theta, assembly=assembly), cells)
 
 
 def aspect_at(
-    leg: FiveBar, foot: ArrayLike, mode: Mode | None = None, *, cells: int = CELLS
+    leg: FiveBar, foot: ArrayLike, *, mode: Mode | None = None, cells: int = CELLS
 ) -> Aspect:
     """Return the aspects of the poses that put F at given points.
 
@@ -125,7 +125,7 @@ def aspect_at(
 
 
 def same_aspect(
-    leg: FiveBar, p: ArrayLike, q: ArrayLike, mode: Mode | None = None, *, cells: int = CELLS
+    leg: FiveBar, p: ArrayLike, q: ArrayLike, *, mode: Mode | None = None, cells: int = CELLS
 ) -> Bools:
     """Return where the foot gets from p to q in one working mode without meeting a singularity.
 
@@ -149,7 +149,7 @@ def same_aspect(
         np.broadcast_shapes(p.shape, q.shape)
     except ValueError:
         raise ArgumentError(f"p and q must broadcast, got shapes {p.shape} and {q.shape}") from None
-    one, other = (aspect_at(leg, foot, mode, cells=cells) for foot in (p, q))
+    one, other = (aspect_at(leg, foot, mode=mode, cells=cells) for foot in (p, q))
     same_sign = one.assembly == other.assembly
     return np.asarray(same_sign & (one.part == other.part) & (one.part > 0))
 

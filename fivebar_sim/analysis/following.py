@@ -121,7 +121,7 @@ def follow(
 
 
 def path_report(
-    leg: FiveBar, foot: ArrayLike, time: ArrayLike, mode: Mode | ArrayLike | None = None
+    leg: FiveBar, foot: ArrayLike, time: ArrayLike, *, mode: Mode | ArrayLike | None = None
 ) -> PathReport:
     """Return how near a foot path comes to each kind of singularity, and when it first meets it.
 

@@ -65,7 +65,7 @@ class Transmission(NamedTuple):
         return Transmission(*(np.abs(angle - 0.5 * np.pi) for angle in self))
 
 
-def determinant(leg: FiveBar, theta: ArrayLike, assembly: int | None = None) -> Array:
+def determinant(leg: FiveBar, theta: ArrayLike, *, assembly: int | None = None) -> Array:
     """Return det J of closed poses, with its sign: s_A s_E assembly.
 
         det J = (AB x BF) (ED x DC) / (BC x DC)
@@ -85,17 +85,17 @@ def determinant(leg: FiveBar, theta: ArrayLike, assembly: int | None = None) -> 
     return _decompose(leg, theta, assembly)[0]
 
 
-def manipulability(leg: FiveBar, theta: ArrayLike, assembly: int | None = None) -> Array:
+def manipulability(leg: FiveBar, theta: ArrayLike, *, assembly: int | None = None) -> Array:
     """Return |det J| = s_1 s_2: pi times it is the area of the velocity ellipse.
 
     Args, Returns, Raises: as `determinant`.
 
     See: Yoshikawa 1985, whose measure sqrt(det J J^T) this is.
     """
-    return np.abs(determinant(leg, theta, assembly))
+    return np.abs(determinant(leg, theta, assembly=assembly))
 
 
-def condition(leg: FiveBar, theta: ArrayLike, assembly: int | None = None) -> Array:
+def condition(leg: FiveBar, theta: ArrayLike, *, assembly: int | None = None) -> Array:
     """Return the condition number s_1 / s_2 of J: 1 is isotropic.
 
     Args:
@@ -115,7 +115,7 @@ def condition(leg: FiveBar, theta: ArrayLike, assembly: int | None = None) -> Ar
     return np.where(lost, np.inf, s[..., 0] / np.where(lost, 1.0, s[..., 1]))
 
 
-def velocity_ellipse(leg: FiveBar, theta: ArrayLike, assembly: int | None = None) -> Ellipse:
+def velocity_ellipse(leg: FiveBar, theta: ArrayLike, *, assembly: int | None = None) -> Ellipse:
     """Return the velocities of the foot for motor rates of |theta_dot| = 1 rad/s.
 
     Args:
@@ -135,7 +135,7 @@ def velocity_ellipse(leg: FiveBar, theta: ArrayLike, assembly: int | None = None
     return Ellipse(s, np.swapaxes(U, -1, -2))
 
 
-def force_ellipse(leg: FiveBar, theta: ArrayLike, assembly: int | None = None) -> Ellipse:
+def force_ellipse(leg: FiveBar, theta: ArrayLike, *, assembly: int | None = None) -> Ellipse:
     """Return the forces of the foot on the world, at rest, for motor torques of |tau| = 1 N m.
 
     Args:
@@ -157,7 +157,7 @@ def force_ellipse(leg: FiveBar, theta: ArrayLike, assembly: int | None = None) -
 
 
 def transmission_angles(
-    leg: FiveBar, theta: ArrayLike, assembly: int | None = None
+    leg: FiveBar, theta: ArrayLike, *, assembly: int | None = None
 ) -> Transmission:
     """Return the angles at B, C and D between the links that meet there.
 
@@ -180,7 +180,7 @@ def transmission_angles(
         LoopOpenError: Where the links do not meet, and at B = D.
     """
     A, E = bases(leg)
-    p = closed_points(leg, theta, assembly)
+    p = closed_points(leg, theta, assembly=assembly)
     return Transmission(
         B=np.abs(angle_between(A - p.B, p.F - p.B)),
         C=np.abs(angle_between(p.B - p.C_left, p.D - p.C_left)),
@@ -192,7 +192,7 @@ def _decompose(leg: FiveBar, theta: ArrayLike, assembly: int | None) -> tuple[Ar
     """Return det J (...), the singular values of J (..., 2) and U (..., 2, 2)."""
     J = jacobian(leg, theta, assembly)
     A, E = bases(leg)
-    p = closed_points(leg, theta, assembly)
+    p = closed_points(leg, theta, assembly=assembly)
     DC = p.C_right - p.D
     det = cross(p.B - A, p.F - p.B) * cross(p.D - E, DC) / cross(p.C_left - p.B, DC)
     U, s, _ = np.linalg.svd(J)

@@ -62,7 +62,7 @@ class Distances(NamedTuple):
     loop: Array
 
 
-def distances(leg: FiveBar, theta: ArrayLike, assembly: int | None = None) -> Distances:
+def distances(leg: FiveBar, theta: ArrayLike, *, assembly: int | None = None) -> Distances:
     """Return the signed distances of closed poses from the singularities.
 
         side_A = (AF x AB) / max(|AB|, |BF|)
@@ -82,10 +82,10 @@ def distances(leg: FiveBar, theta: ArrayLike, assembly: int | None = None) -> Di
         LoopOpenError: Where the links do not meet, and at B = D, where C may be anywhere on a
             circle: `distances_of` accepts that pose, and `distances_at` can return it.
     """
-    return distances_of(leg, closed_points(leg, theta, assembly))
+    return distances_of(leg, closed_points(leg, theta, assembly=assembly))
 
 
-def distances_at(leg: FiveBar, foot: ArrayLike, mode: Mode | None = None) -> Distances:
+def distances_at(leg: FiveBar, foot: ArrayLike, *, mode: Mode | None = None) -> Distances:
     """Return the signed distances from the singularities, of the poses that put F at given points.
 
     Args:

@@ -51,8 +51,8 @@ def knees(leg: FiveBar, theta: Array) -> tuple[Array, Array]:
     return A + leg.L1 * unit(theta[..., 0]), E + leg.L4 * unit(theta[..., 1])
 
 
-def loop_joint(leg: FiveBar, B: Array, D: Array, assembly: int | None = None) -> Array:
-    """Return C, the crossing of the circles about B and D on the side given by `assembly`.
+def loop_joint(leg: FiveBar, B: Array, D: Array, *, assembly: int | None = None) -> Array:
+    """Return C, the crossing of the circles about B and D on the side that assembly names.
 
     With d = |BD|, u the unit vector along BD, and n = u turned by +90 deg:
 
@@ -106,7 +106,7 @@ def _loop_open(d: Array, is_open: Bools, low: float, high: float) -> LoopOpenErr
     )
 
 
-def closed_points(leg: FiveBar, theta: ArrayLike, assembly: int | None = None) -> Points:
+def closed_points(leg: FiveBar, theta: ArrayLike, *, assembly: int | None = None) -> Points:
     """Return the joints of closed poses.
 
     Args:
@@ -118,8 +118,7 @@ def closed_points(leg: FiveBar, theta: ArrayLike, assembly: int | None = None) -
         LoopOpenError: The links do not meet in some pose.
     """
     B, D = knees(leg, as_pairs(theta, "theta"))
-    C = loop_joint(leg, B, D, assembly)
-    # The extension is rigid with L2, so CF is BC turned and scaled.
+    C = loop_joint(leg, B, D, assembly=assembly)
     F = C + (leg.L6 / leg.L2) * turned(C - B, leg.bend)
     return Points(B, C, C, D, F)
 
@@ -141,10 +140,10 @@ def forward(leg: FiveBar, theta: ArrayLike, assembly: int | None = None) -> Arra
         LoopOpenError: Unless |L2 - L3| <= |BD| <= L2 + L3 and |BD| > 0 in every pose; `.index`
             is the first open one.
     """
-    return closed_points(leg, theta, assembly).F
+    return closed_points(leg, theta, assembly=assembly).F
 
 
-def passive(leg: FiveBar, theta: ArrayLike, assembly: int | None = None) -> Array:
+def passive(leg: FiveBar, theta: ArrayLike, *, assembly: int | None = None) -> Array:
     """Return the knee angles (theta_B, theta_D) of closed poses.
 
     theta_B turns L1's direction into L2's, theta_D L4's into L3's; both in (-pi, pi].
@@ -158,7 +157,7 @@ def passive(leg: FiveBar, theta: ArrayLike, assembly: int | None = None) -> Arra
         LoopOpenError: The links do not meet in some pose.
     """
     A, E = bases(leg)
-    p = closed_points(leg, theta, assembly)
+    p = closed_points(leg, theta, assembly=assembly)
     theta_B = angle_between(p.B - A, p.C_left - p.B)
     theta_D = angle_between(p.D - E, p.C_right - p.D)
     return np.stack([theta_B, theta_D], axis=-1)

@@ -125,7 +125,7 @@ def _solve(leg: FiveBar, foot: Array, mode: Mode) -> tuple[Array, Bools]:
     return np.where(on_motor, 0.0, theta), np.stack([ok_A, ok_E], axis=-1)
 
 
-def inverse_half_angle(leg: FiveBar, foot: ArrayLike, mode: Mode | None = None) -> Array:
+def inverse_half_angle(leg: FiveBar, foot: ArrayLike, *, mode: Mode | None = None) -> Array:
     """Return the motor angles that put the foot F at given points, by the half-angle form.
 
     Arguments and results are those of `kinematics.inverse`; the top of this file has the method.

@@ -91,7 +91,7 @@ class InPlane(NamedTuple):
     foot: Array
 
 
-def forward(hip: Hip, theta3: ArrayLike, assembly: int | None = None) -> Array:
+def forward(hip: Hip, theta3: ArrayLike, *, assembly: int | None = None) -> Array:
     """Return the foot in the body frame.
 
     With (x, z) = `kinematics.forward`, c = cos phi, s = sin phi:
@@ -150,7 +150,7 @@ def leg_plane(hip: Hip, foot: ArrayLike, side: ArrayLike | None = None) -> InPla
 
 
 def inverse(
-    hip: Hip, foot: ArrayLike, mode: Mode | None = None, side: ArrayLike | None = None
+    hip: Hip, foot: ArrayLike, *, mode: Mode | None = None, side: ArrayLike | None = None
 ) -> Array:
     """Return the angles that put the foot at given points: `leg_plane`, then the planar inverse.
 
@@ -180,7 +180,7 @@ def inverse(
     return np.concatenate([phi[..., None], theta], axis=-1)
 
 
-def jacobian(hip: Hip, theta3: ArrayLike, assembly: int | None = None) -> Array:
+def jacobian(hip: Hip, theta3: ArrayLike, *, assembly: int | None = None) -> Array:
     """Return d foot / d (phi, theta_A, theta_E).
 
     The first column is axis x F, the others are those of the planar Jacobian, turned by phi:
@@ -205,7 +205,7 @@ def jacobian(hip: Hip, theta3: ArrayLike, assembly: int | None = None) -> Array:
     """
     phi, theta = _split(theta3)
     J = kinematics.jacobian(hip.leg, theta, assembly)
-    F = _axis_up(hip, forward(hip, theta3, assembly))
+    F = _axis_up(hip, forward(hip, theta3, assembly=assembly))
     by_phi = _axis_up(hip, np.stack([-F[..., 1], F[..., 0], np.zeros(phi.shape)], axis=-1))
     by_A, by_E = (_turn(hip, _in_space(J[..., k]), phi) for k in (0, 1))
     return np.stack([by_phi, by_A, by_E], axis=-1)

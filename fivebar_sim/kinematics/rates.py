@@ -55,7 +55,7 @@ def jacobian(leg: FiveBar, theta: ArrayLike, assembly: int | None = None) -> Arr
         SingularError: B, C and D are in line (BC x DC = 0), so the foot's velocity is infinite.
     """
     A, E = bases(leg)
-    p = closed_points(leg, theta, assembly)
+    p = closed_points(leg, theta, assembly=assembly)
     AB = p.B - A
     ED = p.D - E
     BC = p.C_left - p.B
@@ -81,6 +81,7 @@ def joint_motion(
     foot: ArrayLike,
     foot_dot: ArrayLike,
     foot_ddot: ArrayLike,
+    *,
     mode: Mode | None = None,
 ) -> JointMotion:
     """Return the angles of all four joints along a foot path, with both time derivatives.

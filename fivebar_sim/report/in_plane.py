@@ -143,7 +143,7 @@ def _workspace(ax: Axes, run: StoredRun) -> float:
 
     for curves, name, width in (
         (workspace.boundary(leg, mode=leg.mode), "muted", 1.0),
-        (workspace.singular_curves(leg, leg.mode), "singular", 1.3),
+        (workspace.singular_curves(leg, mode=leg.mode), "singular", 1.3),
     ):
         for curve in curves:
             ax.plot(*(1e3 * curve).T, color=colour(name), lw=width)
