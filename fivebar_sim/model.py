@@ -21,15 +21,9 @@ from fivebar_sim.errors import ArgumentError, GeometryError, unknown
 from fivebar_sim.files import resources
 from fivebar_sim.geometry import LONGEST, FiveBar
 from fivebar_sim.integrator import CONNECT, Integrator, solref
-from fivebar_sim.kinematics.stops import stops_at_B, stops_at_C
-from fivebar_sim.links import Link, combined
+from fivebar_sim.kinematics.stops import stops_at_C
+from fivebar_sim.metrics.columns import JOINTS, MOTORS
 from fivebar_sim.scenario.scenes import Ground, Payload, Scene, Treadmill, named
-
-JOINTS = ("A", "B", "E", "D")
-"""The joints in the order of qpos and of every (..., 4) array of joint angles.
-
-On a rail hip_z comes first: the joints are always the last four.
-"""
 
 HIP_HEIGHT = 1.3
 """Height of a fixed hip above the floor, in leg sizes: the foot cannot touch the floor."""
@@ -260,7 +254,7 @@ def _capsule(
 
 def _weigh(spec: mujoco.MjSpec, leg: FiveBar) -> None:
     """Set the masses: densities of the geoms, or the leg's explicit inertias."""
-    for joint in ("A", "E"):
+    for joint in MOTORS:
         spec.joint(joint).armature = leg.armature
     for name, link in zip(("L1", "L2", "L3", "L4"), leg.links, strict=True):
         # Densities let MuJoCo weigh the geoms itself: a check of `FiveBar.links`, which
@@ -285,8 +279,8 @@ def _explicit(body: mujoco.MjsBody, link: Link) -> None:
 
 
 def _drive(spec: mujoco.MjSpec, servo: Servo | None, drive: Drive) -> None:
-    """Set the motors at A and E: the law of `Servo`, or bare motors, whose ctrl at rest is 0."""
-    for name in ("A", "E"):
+    """Set the motors at A and E: the law of `Servo`, or a bare motor, whose ctrl at rest is 0."""
+    for name in MOTORS:
         joint = spec.joint(name)
         actuator = spec.actuator(name)
         joint.damping[0] = 0.0 if servo is None else servo.passive(drive)

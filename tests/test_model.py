@@ -11,6 +11,7 @@ from fivebar_sim.control.servo import Servo
 from fivebar_sim.errors import ArgumentError
 from fivebar_sim.files import resources
 from fivebar_sim.geometry import FiveBar
+from fivebar_sim.metrics.columns import JOINTS
 
 LEGS = {name: FiveBar.load(name) for name in resources.shipped("models/legs")}
 ODD = LEGS["extended"]
@@ -75,7 +76,7 @@ def test_every_part_is_named() -> None:
         number = getattr(mujoco.mjtObj, f"mjOBJ_{objects.get(kind, kind).upper()}")
         names = [mujoco.mj_id2name(mj, number, i) for i in range(count)]
         assert all(names), kind
-    assert [mj.joint(i).name for i in range(4)] == list(model.JOINTS)
+    assert [mj.joint(i).name for i in range(4)] == list(JOINTS)
     assert [mj.actuator(i).name for i in range(2)] == ["A", "E"]
 
 
@@ -87,7 +88,7 @@ def test_home_is_closed_and_reads_the_kinematics(leg: FiveBar) -> None:
     np.testing.assert_array_equal(data.qpos, q)
     np.testing.assert_array_equal(data.ctrl, q[[0, 2]])
     assert mj.tendon_range[0, 0] < data.ten_length[0] < mj.tendon_range[0, 1]
-    for name, angle in zip(model.JOINTS, q, strict=True):
+    for name, angle in zip(JOINTS, q, strict=True):
         assert mj.joint(name).range[0] < angle < mj.joint(name).range[1]
 
 

@@ -18,7 +18,7 @@ from fivebar_sim.errors import ArgumentError, ConfigError, GeometryError
 from fivebar_sim.files import resources
 from fivebar_sim.geometry import FiveBar
 from fivebar_sim.integrator import Integrator
-from fivebar_sim.paths import Line
+from fivebar_sim.metrics.columns import JOINTS
 from fivebar_sim.rollout import Result
 from fivebar_sim.scenario import Scenario, scenes
 from fivebar_sim.scenario.scenes import Air, Ground, Payload, Rail, Scene, Treadmill
@@ -160,7 +160,7 @@ def test_leg_keeps_its_numbers(leg: FiveBar, scene: Scene) -> None:
     built = model.build(leg, servo=SERVO, scene=scene)
     assert_same(alone, built, *(["L2"] if isinstance(scene, Payload) else []))
     np.testing.assert_array_equal(built.qpos0[-4:], alone.qpos0)
-    assert [built.joint(built.njnt - 4 + i).name for i in range(4)] == list(model.JOINTS)
+    assert [built.joint(built.njnt - 4 + i).name for i in range(4)] == list(JOINTS)
     assert [built.actuator(built.nu - 2 + i).name for i in range(2)] == ["A", "E"]
 
 

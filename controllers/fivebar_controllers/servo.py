@@ -12,10 +12,8 @@ from fivebar_sim.arrays import Array
 from fivebar_sim.control.servo import Servo as ServoGains
 from fivebar_sim.geometry import FiveBar
 from fivebar_sim.integrator import Integrator
+from fivebar_sim.metrics.columns import MOTOR_JOINTS
 from fivebar_sim.motion import Motion
-
-MOTORS = [0, 2]
-"""A and E among the joints A, B, E, D."""
 
 
 class Servo(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -61,10 +59,9 @@ class Servo(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
 
         # The spring of `discrete` acts at the end of the step, that of `implicitfast` at its start.
         rows = slice(1, None) if integrator == "discrete" else slice(None, -1)
-        u = q[rows][:, MOTORS]
+        u = q[rows][:, MOTOR_JOINTS]
         if self.feedforward != "none":
-            # The rate over the step is what the damping acts on; the path's is half a step ahead.
-            rate = np.diff(q[:, MOTORS], axis=0) / h
+            rate = np.diff(q[:, MOTOR_JOINTS], axis=0) / h
             u = u + (servo.damping / servo.kp) * rate
 
         if self.feedforward == "torque":

@@ -1,4 +1,7 @@
-"""The columns of a run's record."""
+"""The columns of a run's record, and where the joints and motors stand in arrays.
+
+Every other list of columns, joints or motors is taken from here.
+"""
 
 from __future__ import annotations
 
@@ -11,7 +14,10 @@ from fivebar_sim.arrays import Array
 Record = dict[str, Array]
 
 JOINTS = ("A", "B", "E", "D")
-"""In the order of qpos."""
+"""The joints in the order of qpos, and of every (..., 4) array of joint angles.
+
+On a rail hip_z comes before them: they are always the last four.
+"""
 
 MOTORS = ("A", "E")
 """The joints that motors drive."""
@@ -19,8 +25,39 @@ MOTORS = ("A", "E")
 MOTOR_JOINTS = [JOINTS.index(motor) for motor in MOTORS]
 """Where the motors stand among the joints."""
 
+MOTORS_FROM_END = [place - len(JOINTS) for place in MOTOR_JOINTS]
+"""Where the motors stand in qpos and qvel, whatever comes before the joints."""
+
 JOINT_COLUMNS = tuple(f"theta_{joint}" for joint in JOINTS)
 """The angles of the four joints."""
+
+RATE_COLUMNS = tuple(f"theta_dot_{joint}" for joint in JOINTS)
+"""The rates of the four joints."""
+
+COMMAND_COLUMNS = tuple(f"ctrl_{motor}" for motor in MOTORS)
+"""What the motors are sent."""
+
+TORQUE_COLUMNS = tuple(f"torque_{motor}" for motor in MOTORS)
+"""What the motors give."""
+
+COLUMNS = (
+    *("time", "target_x", "target_z", "foot_x", "foot_z"),
+    *JOINT_COLUMNS,
+    *RATE_COLUMNS,
+    *COMMAND_COLUMNS,
+    *TORQUE_COLUMNS,
+    "gap",
+)
+"""What every record has, in its order."""
+
+HIP_COLUMNS = ("hip_z", "hip_dot_z")
+"""Of a hip that moves."""
+
+GROUND_COLUMNS = ("ground_x", "ground_z")
+"""The ground's force on the foot."""
+
+BELT_COLUMN = "belt_x"
+"""How far a treadmill's belt has run."""
 
 
 def motors(record: Mapping[str, Array], name: str) -> Array:

@@ -23,7 +23,7 @@ from fivebar_sim.arrays import Array
 from fivebar_sim.dynamics.chain import Chain, Pose, Vector, placed
 from fivebar_sim.geometry import FiveBar
 from fivebar_sim.kinematics.planar import end_velocity
-from fivebar_sim.metrics.columns import JOINTS, motors
+from fivebar_sim.metrics.columns import JOINT_COLUMNS, MOTOR_JOINTS, RATE_COLUMNS, motors
 from fivebar_sim.metrics.ground import contact_radius
 from fivebar_sim.metrics.json_types import Amount, Number, Table
 
@@ -144,8 +144,8 @@ class _Motion(NamedTuple):
     @classmethod
     def of(cls, record: Mapping[str, Array], start: Array) -> _Motion:
         """Return the motion of a record that began at rest."""
-        q = np.stack([record[f"theta_{joint}"] for joint in JOINTS], axis=-1)
-        v = np.stack([record[f"theta_dot_{joint}"] for joint in JOINTS], axis=-1)
+        q = np.stack([record[name] for name in JOINT_COLUMNS], axis=-1)
+        v = np.stack([record[name] for name in RATE_COLUMNS], axis=-1)
         q = _begun(start[-4:], q)
         v = _begun(np.zeros(4), v)
         hip, hip_dot = np.zeros((2, len(q)))
@@ -184,7 +184,7 @@ def balance(body: Body, record: Mapping[str, Array], steps: Steps) -> Balance:
 
     joints = np.column_stack([m.lift, m.w]) if "hip_z" in record else m.w
     return Balance(
-        motor=h * np.sum(torque * m.w[:, [0, 2]], axis=-1),
+        motor=h * np.sum(torque * m.w[:, MOTOR_JOINTS], axis=-1),
         force=h * np.sum(steps.force * foot, axis=-1) if steps.force.size else none,
         ground=ground,
         constraints=h * np.sum(steps.constraint * joints, axis=-1) - ground,

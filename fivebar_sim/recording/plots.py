@@ -9,7 +9,7 @@ import numpy as np
 
 from fivebar_sim.arrays import Array, Bools
 from fivebar_sim.metrics import ground, load
-from fivebar_sim.metrics.columns import Record
+from fivebar_sim.metrics.columns import COMMAND_COLUMNS, JOINT_COLUMNS, MOTORS, Record, motors
 from fivebar_sim.metrics.tracking import tracking_error
 from fivebar_sim.recording.look import (
     BLUE,
@@ -55,9 +55,9 @@ class Series(NamedTuple):
         return self.path.split("/")[0]
 
 
-MOTORS = {"A": ORANGE, "E": BLUE}
-JOINTS = {"theta_A": ORANGE, "theta_B": LIGHT_ORANGE, "theta_E": BLUE, "theta_D": LIGHT_BLUE}
-COMMANDS = {"ctrl_A": RED, "ctrl_E": GREEN}
+MOTOR_COLOURS = dict(zip(MOTORS, (ORANGE, BLUE), strict=True))
+ANGLE_COLOURS = dict(zip(JOINT_COLUMNS, (ORANGE, LIGHT_ORANGE, BLUE, LIGHT_BLUE), strict=True))
+COMMAND_COLOURS = dict(zip(COMMAND_COLUMNS, (RED, GREEN), strict=True))
 
 
 def series(scenario: Scenario, record: Record) -> Iterator[Series]:
@@ -67,7 +67,7 @@ def series(scenario: Scenario, record: Record) -> Iterator[Series]:
     """
     every = np.ones(len(record["time"]), dtype=bool)
     error = tracking_error(record)
-    torque = _columns(record, "torque_A", "torque_E")
+    torque = motors(record, "torque")
     share, loaded = load.moving_share(torque, round(0.5 * SHARE_WINDOW / timestep(record["time"])))
     in_torque = getattr(scenario.controller, "drive", "position") == "torque"
 
@@ -77,7 +77,7 @@ def series(scenario: Scenario, record: Record) -> Iterator[Series]:
     yield from _torques(scenario, record, torque, every, in_torque=in_torque)
     yield Series("load_share", "Load share of A", {"A": ORANGE}, share[:, None], loaded, (0.0, 1.0))
     yield Series("gap", "Loop gap [um]", {"gap": GREEN}, 1e6 * record["gap"][:, None], every)
-    angles = JOINTS if in_torque else JOINTS | COMMANDS
+    angles = ANGLE_COLOURS if in_torque else ANGLE_COLOURS | COMMAND_COLOURS
     title = "Joint angles [deg]" if in_torque else "Joint angles, setpoints [deg]"
     yield Series("angles", title, angles, np.degrees(_columns(record, *angles)), every)
 
@@ -94,11 +94,9 @@ def _torques(
     """Yield the motor torques, the commanded ones of a torque drive, and the servo's limits."""
     title = "Motor torques [mN m]"
     limit = scenario.servo.limit
-    yield Series("torque", title, MOTORS, 1e3 * torque, every)
+    yield Series("torque", title, MOTOR_COLOURS, 1e3 * torque, every)
     if in_torque:
-        yield Series(
-            "torque/ctrl", title, COMMANDS, 1e3 * _columns(record, "ctrl_A", "ctrl_E"), every
-        )
+        yield Series("torque/ctrl", title, COMMAND_COLOURS, 1e3 * motors(record, "ctrl"), every)
     if limit is not None:
         both = np.tile([1e3 * limit, -1e3 * limit], (len(every), 1))
         yield Series("torque/limit", title, {"limit": GREY, "-limit": GREY}, both, every)

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from fivebar_sim.arrays import Array
 from fivebar_sim.geometry import FiveBar
 from fivebar_sim.kinematics import bases, chain_points
+from fivebar_sim.metrics.columns import JOINT_COLUMNS
 
 Rows = NDArray[np.intp]
 
@@ -46,7 +47,7 @@ class DrawnMotion(NamedTuple):
 def drawn_motion(record: Mapping[str, Array], rows: Rows) -> DrawnMotion:
     """Return some rows of a record."""
     return DrawnMotion(
-        q=np.stack([record[f"theta_{joint}"][rows] for joint in "ABED"], axis=-1),
+        q=np.stack([record[name][rows] for name in JOINT_COLUMNS], axis=-1),
         foot=points(record, "foot")[rows],
         target=points(record, "target")[rows],
         hip=record["hip_z"][rows] if "hip_z" in record else None,

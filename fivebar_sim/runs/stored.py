@@ -10,19 +10,11 @@ import numpy as np
 from fivebar_sim.errors import FiveBarError, RunDirectoryError
 from fivebar_sim.kinematics.stops import SPEED_LIMIT
 from fivebar_sim.metrics import load
-from fivebar_sim.metrics.columns import JOINT_COLUMNS, Record
+from fivebar_sim.metrics.columns import BELT_COLUMN, COLUMNS, GROUND_COLUMNS, HIP_COLUMNS, Record
 from fivebar_sim.metrics.measured import Judged
 from fivebar_sim.runs import directory, stored_metrics
 from fivebar_sim.scenario import Scenario
 from fivebar_sim.scenario.scenes import Ground, Treadmill
-
-COLUMNS = (
-    *("time", "target_x", "target_z", "foot_x", "foot_z"),
-    *JOINT_COLUMNS,
-    *(name.replace("theta", "theta_dot") for name in JOINT_COLUMNS),
-    *("ctrl_A", "ctrl_E", "torque_A", "torque_E", "gap"),
-)
-"""What every record has; scenes with a ground have more."""
 
 MOST = {"theta_dot": SPEED_LIMIT, "torque": load.LARGEST}
 """No number of columns that begin so is larger [rad/s, N m]: `simulate` and `load` see to that."""
@@ -121,9 +113,9 @@ def _own_columns(scenario: Scenario) -> list[str]:
     """Return the columns that the scenario's scene adds."""
     columns = []
     if isinstance(scenario.scene, Ground):
-        columns += ["hip_z", "hip_dot_z", "ground_x", "ground_z"]
+        columns += [*HIP_COLUMNS, *GROUND_COLUMNS]
     if isinstance(scenario.scene, Treadmill):
-        columns.append("belt_x")
+        columns.append(BELT_COLUMN)
     return columns
 
 

@@ -10,7 +10,14 @@ from fivebar_sim.control.servo import Drive, applied_torque
 from fivebar_sim.control.servo import saturated as clipped
 from fivebar_sim.errors import DivergedError
 from fivebar_sim.metrics import energy
-from fivebar_sim.metrics.columns import JOINT_COLUMNS, MOTOR_JOINTS, Record
+from fivebar_sim.metrics.columns import (
+    BELT_COLUMN,
+    COLUMNS,
+    GROUND_COLUMNS,
+    HIP_COLUMNS,
+    MOTOR_JOINTS,
+    Record,
+)
 from fivebar_sim.metrics.tracking import left_path
 from fivebar_sim.scenario.scenes import Ground, Treadmill
 from fivebar_sim.simulation.measure import Unrecorded
@@ -37,18 +44,9 @@ def columns(planned: Plan, states: States, begin: int = 0) -> Record:
     target = wanted.foot[rows]
     gap = points.C_right - points.C_left
     torque = _torque(planned, states, begin)
-    record = {
-        "time": wanted.time[rows],
-        "target_x": target[:, 0],
-        "target_z": target[:, 1],
-        "foot_x": points.F[:, 0],
-        "foot_z": points.F[:, 1],
-    }
-    record |= {name: q[:, i] for i, name in enumerate(JOINT_COLUMNS)}
-    record |= {name.replace("theta", "theta_dot"): v[:, i] for i, name in enumerate(JOINT_COLUMNS)}
-    record |= {"ctrl_A": ctrl[:, 0], "ctrl_E": ctrl[:, 1]}
-    record |= {"torque_A": torque[:, 0], "torque_E": torque[:, 1]}
-    record["gap"] = np.hypot(gap[:, 0], gap[:, 1])
+    vectors = [*target.T, *points.F.T, *q.T, *v.T, *ctrl.T, *torque.T]
+    values = [wanted.time[rows], *vectors, np.hypot(gap[:, 0], gap[:, 1])]
+    record = dict(zip(COLUMNS, values, strict=True))
     record |= _surroundings(planned, states, begin)
 
     # Columns of a matrix are strided views: copied, each lies in one piece of memory of its own.
@@ -112,11 +110,11 @@ def _surroundings(planned: Plan, states: States, begin: int) -> Record:
     steps = states.time.shape[1]
     record: Record = {}
     if isinstance(scene, Ground):
-        record |= {"hip_z": states.qpos[0, :, 0], "hip_dot_z": states.qvel[0, :, 0]}
-        record |= {"ground_x": states.ground[0, :, 0], "ground_z": states.ground[0, :, 1]}
-    # A positive belt speed runs towards -x.
+        hip = (states.qpos[0, :, 0], states.qvel[0, :, 0])
+        record |= dict(zip(HIP_COLUMNS, hip, strict=True))
+        record |= dict(zip(GROUND_COLUMNS, states.ground[0].T, strict=True))
     if isinstance(scene, Treadmill):
-        record["belt_x"] = (
+        record[BELT_COLUMN] = (
             -(scene.speed or 0.0) * planned.motion.time[begin + 1 : begin + steps + 1]
         )
     return record

@@ -18,11 +18,9 @@ from fivebar_sim.control.step import ControlStep
 from fivebar_sim.errors import ArgumentError
 from fivebar_sim.kinematics.leg_arrays import LegArrays
 from fivebar_sim.kinematics.stops import SPEED_LIMIT
+from fivebar_sim.metrics.columns import MOTORS_FROM_END as MOTORS
 from fivebar_sim.tasks.base import Part, Task
 from fivebar_sim.tasks.motion import TIME, motion
-
-MOTORS = [-4, -2]
-"""Indices of A and E in qpos and qvel, counted from the end: the hip's height may come first."""
 
 
 class Outcome(NamedTuple):
