@@ -146,7 +146,7 @@ def test_damage_names_file_and_key(tmp_path: Path, change: dict[str, Any], messa
     path = written(tmp_path / "x.json", change)
     with pytest.raises(ConfigError) as caught:
         baseline.read(path)
-    assert str(caught.value).startswith(f"{path} is no baseline{message}")
+    assert str(caught.value).startswith(f"{path} is not a baseline{message}")
 
 
 @pytest.mark.parametrize(
@@ -165,7 +165,7 @@ def test_foreign_files_are_refused(tmp_path: Path, content: bytes, message: str)
     path.write_bytes(content)
     with pytest.raises(ConfigError) as caught:
         baseline.read(path)
-    assert str(caught.value).startswith(f"{path} is no baseline: {message}")
+    assert str(caught.value).startswith(f"{path} is not a baseline: {message}")
 
 
 def test_places_that_cannot_be_read_or_written_are_one_line(tmp_path: Path) -> None:

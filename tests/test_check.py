@@ -186,7 +186,7 @@ def test_wrong_use_is_one_line(recorded: Shell) -> None:
     assert said == "two scenarios are called 'short': give each its own name"
     BASELINE.write_text('{"metrics": {"tracking": 1}}', encoding="utf-8")
     said = recorded.refused("check", "short.toml")
-    assert said == f"{BASELINE} is no baseline: made must be a table, got None"
+    assert said == f"{BASELINE} is not a baseline: made must be a table, got None"
 
 
 @pytest.mark.parametrize(

@@ -165,7 +165,7 @@ def test_diverging_timestep_exits_1_and_leaves_nothing(shell: Shell) -> None:
 def test_place_that_cannot_be_written_is_one_line(shell: Shell) -> None:
     Path("precious").mkdir()
     Path("precious/notes.txt").touch()
-    taken = "something that is no run directory is there"
+    taken = "something that is not a run directory is there"
     for place, message in {
         "precious": f"cannot write precious: {taken}",
         "short.toml": f"cannot write short.toml: {taken}",

@@ -31,8 +31,10 @@ def recorded(shell: Shell) -> Shell:
 def test_replay_of_no_run_is_one_line(shell: Shell) -> None:
     lacks = "it lacks scenario.toml, metrics.json, rollout.parquet, recording.rrd"
     for flags in ((), ("--web",)):
-        assert shell.refused("replay", ".", *flags) == f". is no run directory: {lacks}"
-        assert shell.refused("replay", "no", *flags) == "no is no run directory: no such directory"
+        assert shell.refused("replay", ".", *flags) == f". is not a run directory: {lacks}"
+        assert (
+            shell.refused("replay", "no", *flags) == "no is not a run directory: no such directory"
+        )
     assert "File name too long" in shell.refused("replay", "x" * 300)
     twice = "run directories must be different, got no twice"
     assert shell.refused("replay", "no", "no") == twice
@@ -60,7 +62,7 @@ def test_replay_starts_the_viewer_on_loopback(
     def pretend(command: list[str], env: dict[str, str]) -> subprocess.CompletedProcess[bytes]:
         started.append(command)
         assert env["CI"] == "true"
-        assert recording_file.readable(Path(command[-1]))
+        assert recording_file.is_readable(Path(command[-1]))
         return subprocess.CompletedProcess(command, 0)
 
     monkeypatch.setenv("DISPLAY", ":0")
@@ -108,7 +110,7 @@ def test_web_serves_until_it_is_ended_and_leaves_nothing(
         connection = http.client.HTTPConnection("127.0.0.1", int(found[1]), timeout=10)
         connection.request("GET", "/recording.rrd")
         (tmp_path / "served.rrd").write_bytes(connection.getresponse().read())
-        assert recording_file.readable(tmp_path / "served.rrd")
+        assert recording_file.is_readable(tmp_path / "served.rrd")
         server.send_signal(number)
         out, err = server.communicate(timeout=30)
         assert (server.returncode, out, err) == (status, "", "")

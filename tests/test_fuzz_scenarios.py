@@ -120,7 +120,7 @@ LAWS = {
 def test_inputs_that_once_broke_something(bench: Bench, name: str) -> None:
     kind = name.partition("/")[0]
     if kind == "recordings":
-        assert not recording_file.readable(CORPUS / name)
+        assert not recording_file.is_readable(CORPUS / name)
         return
     LAWS[kind].holds(bench, (CORPUS / name).read_bytes())
     said = EXPECTED[name]

@@ -107,7 +107,7 @@ def test_several_are_one_temporary_file(run: Path) -> None:
     shutil.copytree(run, other)
     before = {path: path.stat().st_mtime_ns for path in run.parent.glob("*/*")}
     with recording_file.opened([run, other]) as file:
-        assert recording_file.readable(file)
+        assert recording_file.is_readable(file)
         assert file.is_relative_to(run.parent / "temporary")
     assert {path: path.stat().st_mtime_ns for path in run.parent.glob("*/*")} == before
     assert os.listdir(run.parent / "temporary") == []
@@ -117,16 +117,16 @@ def test_runs_are_called_as_their_directories_or_by_their_paths(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    assert recording_file.called([Path("a"), Path("b/c")]) == ["a", "c"]
+    assert recording_file.labels_of([Path("a"), Path("b/c")]) == ["a", "c"]
     paths = [Path("a/trot"), Path("b/trot")]
-    assert recording_file.called(paths) == [str(tmp_path / path) for path in paths]
+    assert recording_file.labels_of(paths) == [str(tmp_path / path) for path in paths]
     with pytest.raises(ConfigError, match=r"run directories must be different, got b/\.\./a twice"):
-        recording_file.called([Path("b"), Path("b/../a"), Path("a")])
+        recording_file.labels_of([Path("b"), Path("b/../a"), Path("a")])
 
 
 def test_what_lacks_more_than_the_recording_is_no_run(run: Path) -> None:
     (run / "recording.rrd").unlink()
     (run / "metrics.json").unlink()
-    lacks = r"is no run directory: it lacks metrics\.json, recording\.rrd$"
+    lacks = r"is not a run directory: it lacks metrics\.json, recording\.rrd$"
     with pytest.raises(RunDirectoryError, match=lacks), recording_file.opened([run]):
         pass

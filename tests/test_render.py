@@ -254,9 +254,9 @@ def test_what_cannot_be_drawn_is_one_line(shell: Shell, monkeypatch: pytest.Monk
     monkeypatch.setattr(gl, "find", lambda: "egl")  # refused before anything is drawn
     for arguments, line in REFUSED:
         assert shell.refused("render", "mine", *arguments).startswith(line)
-    assert shell.refused("render", "no") == "no is no run directory: no such directory"
+    assert shell.refused("render", "no") == "no is not a run directory: no such directory"
     Path("mine/rollout.parquet").write_bytes(b"no")
-    assert "mine/rollout.parquet is no record" in shell.refused("render", "mine")
+    assert "mine/rollout.parquet is not a record" in shell.refused("render", "mine")
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="elsewhere MuJoCo's own GL is used")

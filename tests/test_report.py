@@ -225,7 +225,7 @@ def test_refusals_are_one_line(
     shutil.copytree(runs["limited"], shell.folder / "mine")
     (shell.folder / "d.html").mkdir()
     (shell.folder / "file").write_text("x")
-    assert shell.refused("report", "no") == "no is no run directory: no such directory"
+    assert shell.refused("report", "no") == "no is not a run directory: no such directory"
     assert "a.txt: a report must end in .html" in shell.refused("report", "mine", "--out", "a.txt")
     assert "a directory is there" in shell.refused("report", "mine", "--out", "d.html")
     assert "cannot write file/a.html" in shell.refused("report", "mine", "--out", "file/a.html")
@@ -256,7 +256,7 @@ def _with(key: str, value: object) -> Callable[[Path], object]:
     [
         (
             lambda run: (run / "rollout.parquet").write_bytes(b"PAR1"),
-            "rollout.parquet is no record",
+            "rollout.parquet is not a record",
         ),
         (lambda run: (run / "metrics.json").unlink(), "it lacks metrics.json"),
         (_with("load.torque_rms.E", MISSING), "metrics.json: load.torque_rms.E is missing"),

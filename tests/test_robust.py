@@ -144,7 +144,7 @@ def test_a_damaged_record_is_noticed(shell: Shell) -> None:
     data[len(data) // 2] ^= 1  # one bit among the numbers
     file.write_bytes(data)
     said = shell.refused("report", "mine")
-    assert said.startswith("mine/rollout.parquet is no record, or a damaged one: ")
+    assert said.startswith("mine/rollout.parquet is not a record, or is damaged: ")
 
 
 def test_a_recording_of_a_newer_patch_is_rebuilt_not_warned_about(tmp_path: Path) -> None:
@@ -152,7 +152,7 @@ def test_a_recording_of_a_newer_patch_is_rebuilt_not_warned_about(tmp_path: Path
     here = [int(part) for part in re.findall(r"\d+", rerun.__version__)[:3]]
     for patch, newer in ((here[2], False), (here[2] + 1, True)):
         file.write_bytes(b"RRF2" + bytes([here[0], here[1], patch, 0]))
-        assert recording_file.newer(file) == newer
+        assert recording_file.is_newer(file) == newer
 
 
 # places

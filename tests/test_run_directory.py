@@ -186,7 +186,7 @@ def test_what_is_not_ours_is_refused_and_untouched(tmp_path: Path, result: Resul
     for name in ("file", "folder", "dangling"):
         with pytest.raises(RunDirectoryError) as caught:
             result.write(tmp_path / name)
-        what = "something that is no run directory is there"
+        what = "something that is not a run directory is there"
         assert str(caught.value) == f"cannot write {tmp_path / name}: {what}"
         assert isinstance(caught.value, OSError)
     assert names(tmp_path) == before
@@ -264,6 +264,6 @@ def test_incomplete_run_is_none(tmp_path: Path, result: Result, missing: str) ->
     assert not directory.is_run(where)
     with pytest.raises(RunDirectoryError) as caught:
         directory.check_run(where)
-    assert str(caught.value) == f"{where} is no run directory: it lacks {missing}"
+    assert str(caught.value) == f"{where} is not a run directory: it lacks {missing}"
     with pytest.raises(RunDirectoryError, match=r"no such directory$"):
         directory.check_run(tmp_path / "nowhere")

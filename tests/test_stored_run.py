@@ -69,12 +69,12 @@ def _shortened(run: Path) -> None:
 @pytest.mark.parametrize(
     ("damage", "said"),
     [
-        (_truncated, "rollout.parquet is no record, or a damaged one: "),
-        (_foreign, "rollout.parquet is no record: it lacks the column target_x"),
+        (_truncated, "rollout.parquet is not a record, or is damaged: "),
+        (_foreign, "rollout.parquet is not a record: it lacks the column target_x"),
         (lambda run: _changed(run, "gap", None), "column gap must be numbers, all there"),
         (lambda run: _changed(run, "gap", float("nan")), "column gap is not finite"),
         (_shortened, "a run of 0.8 s at 0.001 s has 800 rows, got 700"),
-        (lambda run: (run / "rollout.parquet").write_bytes(b""), "is no record, or a damaged one"),
+        (lambda run: (run / "rollout.parquet").write_bytes(b""), "is not a record, or is damaged"),
         (lambda run: (run / "metrics.json").write_text("{"), "metrics.json is not JSON: "),
         (
             lambda run: (run / "metrics.json").write_text("[" * 100_000),
@@ -82,7 +82,7 @@ def _shortened(run: Path) -> None:
         ),
         (
             lambda run: _without(run, "ground_z"),
-            "no record of the scene 'rail': it lacks the column",
+            "not a record of the scene 'rail': it lacks the column",
         ),
         (
             lambda run: _changed(run, "foot_x", 1e200),
@@ -94,9 +94,12 @@ def _shortened(run: Path) -> None:
         ),
         (lambda run: _changed(run, "theta_dot_B", 2e4), "theta_dot_B must be in [-10000, 10000], "),
         (lambda run: _changed(run, "time", 9.0), "column time must be 0.004 s in row 3, got 9"),
-        (lambda run: (run / "metrics.json").unlink(), "is no run directory: it lacks metrics.json"),
-        (lambda run: (run / "scenario.toml").write_text("x = 1"), "is no run that can be read: "),
-        (shutil.rmtree, "is no run directory: no such directory"),
+        (
+            lambda run: (run / "metrics.json").unlink(),
+            "is not a run directory: it lacks metrics.json",
+        ),
+        (lambda run: (run / "scenario.toml").write_text("x = 1"), "cannot be read as a run: "),
+        (shutil.rmtree, "is not a run directory: no such directory"),
     ],
 )
 def test_damage_is_named(

@@ -51,7 +51,7 @@ def _serve(run_dirs: tuple[Path, ...], port: int) -> int:
     from fivebar_sim.recording import web
     from fivebar_sim.runs import recording_file
 
-    title = " + ".join(recording_file.called(run_dirs))
+    title = " + ".join(recording_file.labels_of(run_dirs))
     try:
         with web.Server(port) as server:
             with recording_file.opened(run_dirs) as file:

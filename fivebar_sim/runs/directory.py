@@ -1,4 +1,7 @@
-"""A run directory: scenario.toml, metrics.json, rollout.parquet, recording.rrd; whole or absent."""
+"""Writes run directories, whole or not at all.
+
+They hold scenario.toml, metrics.json, rollout.parquet and recording.rrd.
+"""
 
 from __future__ import annotations
 
@@ -17,19 +20,19 @@ from fivebar_sim.files import leftovers, whole_file
 from fivebar_sim.recording import rrd
 
 FILES = ("scenario.toml", "metrics.json", "rollout.parquet", "recording.rrd")
-
+"""What a complete run directory holds."""
 
 ATTEMPTS = 20
-"""How often a run directory is exchanged anew where others do the same."""
+"""How often the exchange is tried while other processes write to the same place."""
 
 OVERTAKEN = {errno.ENOENT, errno.ENOTEMPTY, errno.EEXIST}
-"""What a rename fails with if another one came in between."""
+"""Errors of a rename when another process renamed something there in between."""
 
 
 def write(result: rrd.Run, path: Path) -> Path:
-    """Write a run directory: beside its place first, then renamed, so that it is never half there.
+    """Write a run directory beside its place, then rename it, so that it is never incomplete.
 
-    An existing run directory (or an empty one) is exchanged; anything else there is refused.
+    An existing run directory, or an empty one, is replaced; anything else there is refused.
 
     Raises:
         RunDirectoryError: The place is taken by something else, or cannot be written.
@@ -44,6 +47,7 @@ def write(result: rrd.Run, path: Path) -> Path:
     try:
         with leftovers.held(stage):
             _fill(stage, result)
+            # mkdtemp makes directories that only their owner can enter.
             stage.chmod(0o755)
             _exchange(stage, path)
     except OSError as error:
@@ -65,13 +69,16 @@ def check_place(path: Path) -> None:
     try:
         ours = path.is_dir() and (is_run(path) or not any(path.iterdir()))
         taken = not ours and (path.exists() or path.is_symlink())
+        # No system renames the folder that a process works in.
         if path.resolve() == Path.cwd():
-            taken = True  # no system renames the folder it is in
+            taken = True
     except OSError as error:
         raise RunDirectoryError(f"cannot write {path}: {error.strerror}") from None
 
     if taken:
-        raise RunDirectoryError(f"cannot write {path}: something that is no run directory is there")
+        raise RunDirectoryError(
+            f"cannot write {path}: something that is not a run directory is there"
+        )
     whole_file.check_parent(path, RunDirectoryError)
 
 
@@ -89,7 +96,7 @@ def check_run(path: Path) -> None:
     missing = [name for name in FILES if not (path / name).is_file()]
     if missing:
         what = f"it lacks {', '.join(missing)}" if path.is_dir() else "no such directory"
-        raise RunDirectoryError(f"{path} is no run directory: {what}")
+        raise RunDirectoryError(f"{path} is not a run directory: {what}")
 
 
 def _fill(stage: Path, result: rrd.Run) -> None:
@@ -105,16 +112,17 @@ def _fill(stage: Path, result: rrd.Run) -> None:
 
 
 def write_record(path: Path, record: Mapping[str, Array]) -> None:
-    """Write the record as Parquet, one column each, with checksums: a damaged one is noticed."""
+    """Write the record as Parquet, one column each, with checksums that show damage."""
     import pyarrow
     import pyarrow.parquet
 
-    with path.open("wb") as file:  # given a name, pyarrow would expand ~ and read it as a URI
+    # Given a name instead of a file, pyarrow would expand ~ and read it as a URI.
+    with path.open("wb") as file:
         pyarrow.parquet.write_table(pyarrow.table(dict(record)), file, write_page_checksum=True)
 
 
 def _exchange(stage: Path, path: Path) -> None:
-    """Rename stage to path, over what others write there at the same time: the last wins."""
+    """Rename stage to path, even while other processes write there: the last one wins."""
     for left in reversed(range(ATTEMPTS)):
         try:
             return _renamed(stage, path)
@@ -124,7 +132,7 @@ def _exchange(stage: Path, path: Path) -> None:
 
 
 def _renamed(stage: Path, path: Path) -> None:
-    """Rename stage to path; what is there goes aside first, and is deleted last."""
+    """Rename stage to path; what was there is moved aside first and deleted last."""
     if not path.exists():
         stage.rename(path)
         return
@@ -135,7 +143,8 @@ def _renamed(stage: Path, path: Path) -> None:
         path.rename(old)
         try:
             stage.rename(path)
-        except BaseException:  # also an interrupt: what was there comes back
+        except BaseException:
+            # An interrupt too must not lose the run that was there.
             if not path.exists():
                 old.rename(path)
             raise

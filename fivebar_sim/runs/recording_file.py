@@ -18,20 +18,21 @@ RECORDING = "recording.rrd"
 
 @contextmanager
 def opened(paths: Sequence[Path]) -> Iterator[Path]:
-    """Give the recording of a run directory, or of several over each other, while it is needed.
+    """Yield the recording of a run directory, or of several drawn over each other.
 
-    That of one is its own recording.rrd: rebuilt from the record where it is missing, damaged, or
-    of another Rerun, and kept if it can be. Every other is a temporary file that is removed.
+    For one run it is the directory's own recording.rrd: rebuilt from the record if it is missing,
+    damaged, or written by another Rerun, and saved there if possible. For several it is a temporary
+    file, removed afterwards.
 
     Args:
         paths: Run directories, at least one, all different.
 
     Raises:
-        RunDirectoryError: One is no run directory, or cannot be read.
+        RunDirectoryError: One is not a run directory, or cannot be read.
         ConfigError: One was given twice.
         OSError: No temporary file can be written.
     """
-    labels = called(paths)
+    labels = labels_of(paths)
     runs = [stored.read(path) for path in paths]
     with tempfile.TemporaryDirectory(prefix="fivebar-") as folder:
         if len(runs) == 1:
@@ -42,8 +43,8 @@ def opened(paths: Sequence[Path]) -> Iterator[Path]:
         yield file
 
 
-def called(paths: Sequence[Path]) -> list[str]:
-    """Return what runs are called beside each other: as their directories, or by their paths.
+def labels_of(paths: Sequence[Path]) -> list[str]:
+    """Return a label for each run: its directory's name, or its path if two names are the same.
 
     Raises:
         ConfigError: One was given twice.
@@ -57,18 +58,20 @@ def called(paths: Sequence[Path]) -> list[str]:
 
 
 def _own(run: stored.StoredRun, folder: Path) -> Path:
-    """Return a recording of one run that can be read: its own, or one in the folder."""
+    """Return a readable recording of one run: its own, or a new one in the folder."""
     own = run.path / RECORDING
-    if readable(own):
+    if is_readable(own):
         return own
 
     try:
         handle, name = tempfile.mkstemp(prefix=f".{RECORDING}.", suffix=".partial", dir=run.path)
-    except OSError:  # a directory that one may not write in
+    except OSError:
+        # The run lies where the user may not write: the recording then lasts as long as its viewer.
         file = folder / RECORDING
         rrd.write(file, [run])
         return file
 
+    # Written beside and renamed, so that an interrupt never leaves half a recording.
     os.close(handle)
     beside = Path(name)
     try:
@@ -81,22 +84,21 @@ def _own(run: stored.StoredRun, folder: Path) -> Path:
     return own
 
 
-def readable(path: Path) -> bool:
-    """Return whether the installed Rerun reads a recording, to its end.
+def is_readable(path: Path) -> bool:
+    """Return whether the installed Rerun can read a recording to its end.
 
-    One of a newer Rerun counts as unreadable: what it cannot read of that it skips with a warning.
+    A recording of a newer Rerun counts as unreadable: Rerun skips what it does not know there, with
+    a warning.
     """
-    return path.is_file() and not newer(path) and check.reads(path)
+    return path.is_file() and not is_newer(path) and check.reads(path)
 
 
-def newer(path: Path) -> bool:
-    """Return whether a recording is of a newer Rerun than the installed one.
-
-    Its first eight bytes are RRF2, then major, minor, patch, and what was before the release.
-    """
+def is_newer(path: Path) -> bool:
+    """Return whether a recording was written by a newer Rerun than the installed one."""
     import rerun
 
     with path.open("rb") as file:
         head = file.read(8)
+    # The header is b"RRF2", then major, minor and patch as one byte each, and one of pre-releases.
     here = [int(part) for part in re.findall(r"\d+", rerun.__version__)[:3]]
     return list(head[4:7]) > here

@@ -17,13 +17,13 @@ from fivebar_sim.scenario import Scenario
 from fivebar_sim.scenario.scenes import Ground, Treadmill
 
 MOST = {"theta_dot": SPEED_LIMIT, "torque": load.LARGEST}
-"""No number of columns that begin so is larger [rad/s, N m]: `simulate` and `load` see to that."""
+"""Largest number in columns whose names begin so [rad/s, N m]; `simulate` and `load` ensure it."""
 
 LARGEST = 1e100
-"""No number of any other column is larger: its square, and what is drawn of it, cannot overflow."""
+"""Largest number in any other column: neither its square nor a drawing of it can overflow."""
 
 SOURCES = ("scenario.toml", "metrics.json", "rollout.parquet")
-"""What a run is read from; its recording is derived, and may be missing."""
+"""The files that a run is read from; the recording can be rebuilt and may be missing."""
 
 
 class StoredRun(NamedTuple):
@@ -60,13 +60,13 @@ def read(path: Path) -> StoredRun:
     try:
         scenario = Scenario.load(path / "scenario.toml")
     except FiveBarError as error:
-        raise RunDirectoryError(f"{path} is no run that can be read: {error}") from None
+        raise RunDirectoryError(f"{path} cannot be read as a run: {error}") from None
 
     record = _record(path / "rollout.parquet")
     for name in _own_columns(scenario):
         if name not in record:
             raise RunDirectoryError(
-                f"{path / 'rollout.parquet'} is no record of the scene "
+                f"{path / 'rollout.parquet'} is not a record of the scene "
                 f"{scenario.scene.kind!r}: it lacks the column {name}"
             )
 
@@ -85,11 +85,12 @@ def read(path: Path) -> StoredRun:
 
 
 def _check_plausible(file: Path, record: Record, timestep: float) -> None:
-    """Raise unless the numbers of a record are such as a run gives: no arithmetic overflows.
+    """Raise unless a record's numbers could come from a run, so that no arithmetic overflows.
 
     Raises:
         RunDirectoryError: Names the file, the column, the row, and the legal range.
     """
+    # A wrong time column would shift every plot against the scenario without an error.
     due = (np.arange(len(record["time"])) + 1) * timestep
     late = np.abs(record["time"] - due) > 0.5 * timestep
     if late.any():
@@ -125,27 +126,29 @@ def _record(file: Path) -> Record:
     import pyarrow.parquet
 
     try:
-        with file.open("rb") as stream:  # given a name, pyarrow would expand ~ and read it as a URI
+        # Given a name instead of a file, pyarrow would expand ~ and read it as a URI.
+        with file.open("rb") as stream:
             table = pyarrow.parquet.read_table(stream, page_checksum_verification=True)
     except (OSError, pyarrow.ArrowException) as error:
         if isinstance(error, OSError) and error.strerror:
             raise RunDirectoryError(f"cannot read {file}: {error.strerror}") from None
-        said = " ".join(str(error).split())
-        raise RunDirectoryError(f"{file} is no record, or a damaged one: {said}") from None
+        # pyarrow's messages may run over several lines.
+        message = " ".join(str(error).split())
+        raise RunDirectoryError(f"{file} is not a record, or is damaged: {message}") from None
 
     missing = [name for name in COLUMNS if name not in table.column_names]
     if missing:
-        raise RunDirectoryError(f"{file} is no record: it lacks the column {missing[0]}")
+        raise RunDirectoryError(f"{file} is not a record: it lacks the column {missing[0]}")
 
     record: Record = {}
     for name in table.column_names:
         column = table[name]
         if not pyarrow.types.is_float64(column.type) or column.null_count or not len(column):
             raise RunDirectoryError(
-                f"{file} is no record: column {name} must be numbers, all there"
+                f"{file} is not a record: column {name} must be numbers, all there"
             )
         record[name] = column.to_numpy()
         if not np.isfinite(record[name]).all():
-            raise RunDirectoryError(f"{file} is no record: column {name} is not finite")
+            raise RunDirectoryError(f"{file} is not a record: column {name} is not finite")
 
     return record

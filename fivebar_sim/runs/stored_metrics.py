@@ -1,4 +1,4 @@
-"""What metrics.json may say: every key with its type and range, checked once, for every reader."""
+"""Reads metrics.json: every key is checked for its type and range, once for all readers."""
 
 from __future__ import annotations
 
@@ -16,15 +16,15 @@ from fivebar_sim.metrics.measured import Judged
 
 
 def read(file: Path, *, grounded: bool) -> Judged:
-    """Return what metrics.json says, found to be what a run says.
+    """Return all of metrics.json, checked.
 
     Args:
-        file: Where it is.
+        file: The metrics.json of a run directory.
         grounded: Whether the run was in a scene with a ground, which has metrics of its own.
 
     Raises:
-        RunDirectoryError: It cannot be read, is no JSON, lacks a key, has an unknown one, or a
-            value that no run has; names the file and the key.
+        RunDirectoryError: It cannot be read, is not JSON, lacks a key, has an unknown one, or a
+            value out of its range; names the file and the key.
     """
     try:
         input_file.check(file, input_file.TEXT)
@@ -34,6 +34,7 @@ def read(file: Path, *, grounded: bool) -> Judged:
     except (ValueError, RecursionError) as error:
         raise RunDirectoryError(f"{file} is not JSON: {error}") from None
 
+    # msgspec would recurse as deep as the file goes.
     if tables.is_deep(metrics):
         raise RunDirectoryError(f"{file} is not of a run: nested too deep")
 
@@ -49,7 +50,7 @@ def read(file: Path, *, grounded: bool) -> Judged:
 
 
 def _explain(message: str, metrics: Any) -> str:
-    """Return msgspec's message with the key in front and what came behind."""
+    """Return msgspec's message, with the key in front of it and the value behind."""
     text, _, at = message.partition(" - at `$")
     key = at.rstrip("`").lstrip(".")
     missing = re.fullmatch(r"Object (missing required|contains unknown) field `(.+)`", text)
@@ -64,8 +65,9 @@ def _explain(message: str, metrics: Any) -> str:
     if text.startswith("Invalid enum value"):
         return f"{name} must be 'pass' or 'fail', {came}"
 
+    # A table's own check has a message of its own; all others begin with "Expected".
     expected = re.fullmatch(r"Expected `([^`]+)`(.*?)(, got .*)?", text)
-    if not expected:  # a table's own check
+    if not expected:
         return f"{name}: {text}"
 
     words = [tables.WORDS.get(word, word) for word in expected[1].split(" | ")]
