@@ -1,11 +1,11 @@
-"""A baseline: what a scenario's metrics were when someone said that they are good.
+"""Baselines: the metrics of a scenario at a time when someone accepted them as good.
 
-It lies beside the scenario's file, in baselines/NAME.json: JSON with sorted keys and no date, so
-that recording it again where nothing changed gives the same bytes.
+A baseline lies beside the scenario's file, in baselines/NAME.json: JSON with sorted keys and no
+date, so that recording it again without a change gives the same bytes.
 
-How far a metric may move is written beside every value, and can be edited there; it is kept when
-the value is recorded anew. The defaults stand far above what differs without anybody's doing, and
-far below what a change of the leg, the gains or the timing does. Measured on the shipped scenarios:
+The tolerance of each metric is written beside its value and can be edited there; recording a new
+value keeps it. The defaults are far above what platforms and versions change, and far below the
+effect of another leg, gain or timing. Measured on the shipped scenarios:
 
     again, alone, batched, on 1 or 2 threads                      the same bits
     MuJoCo 3.16, stepped by mj_step; NumPy 2.0, or without AVX    the same bits
@@ -37,12 +37,12 @@ from fivebar_sim.metrics.limits import look_up
 RELATIVE = 0.005
 """By what part of its recorded value a metric may move."""
 
-SAID = ("mujoco", "platform", "integrator", "timestep", "seed")
-"""What of a run's provenance a baseline records."""
+MADE_WITH = ("mujoco", "platform", "integrator", "timestep", "seed")
+"""The keys of a run's provenance that a baseline records."""
 
 
 class Made(msgspec.Struct, frozen=True):
-    """What the recorded values were made with; see `provenance`."""
+    """Versions and settings that the recorded values were made with; see `provenance`."""
 
     mujoco: str
     platform: str
@@ -81,31 +81,33 @@ class Baseline(msgspec.Struct, frozen=True):
     metrics: dict[str, Recorded]
 
     def differences(self, provenance: Mapping[str, Any]) -> list[str]:
-        """Return what a run was made with otherwise: "mujoco 3.16.0, now 3.17.0"."""
-        said = msgspec.to_builtins(self.made)
-        return [f"{k} {said[k]}, now {provenance[k]}" for k in SAID if said[k] != provenance[k]]
+        """Return how a run was made differently: "mujoco 3.16.0, now 3.17.0"."""
+        then = msgspec.to_builtins(self.made)
+        return [
+            f"{key} {then[key]}, now {provenance[key]}"
+            for key in MADE_WITH
+            if then[key] != provenance[key]
+        ]
 
 
 def place(source: str) -> Path:
-    """Return where the baseline of a scenario lies, given its shipped name or its file."""
+    """Return the path of a scenario's baseline, given its shipped name or its file."""
     file = resources.shipped("scenarios").get(source, Path(source))
     return file.parent / "baselines" / f"{file.stem}.json"
 
 
 def record(metrics: Mapping[str, Any], old: Baseline | None = None) -> Baseline:
-    """Return the baseline of a run's metrics, with the tolerances of the old one.
-
-    Values have six digits: what differs between machines stays out of the file.
-    """
+    """Return a new baseline of a run's metrics; tolerances of the old one are kept."""
     kept = old.metrics if old else {}
     recorded = {}
     for key in sorted(ABSOLUTE):
         if key.split(".")[0] in metrics:
             value = look_up(metrics, key)
+            # Six digits: differences between machines are beyond them.
             rounded = None if value is None else float(f"{value:.6g}")
             default = Recorded(None, ABSOLUTE[key], RELATIVE)
             recorded[key] = msgspec.structs.replace(kept.get(key, default), value=rounded)
-    made = {key: metrics["provenance"][key] for key in SAID}
+    made = {key: metrics["provenance"][key] for key in MADE_WITH}
     return Baseline(Made(**made), recorded)
 
 
@@ -113,7 +115,7 @@ def read(path: Path) -> Baseline | None:
     """Return the baseline of a file, or None if there is no such file.
 
     Raises:
-        ConfigError: It cannot be read, or is damaged or of something else; names file and key.
+        ConfigError: It cannot be read, is damaged, or is not a baseline; names file and key.
     """
     try:
         input_file.check(path, input_file.TEXT)
@@ -123,14 +125,15 @@ def read(path: Path) -> Baseline | None:
     except OSError as error:
         raise ConfigError(f"cannot read baseline {path}: {error.strerror}") from None
     except (ValueError, RecursionError) as error:
-        raise ConfigError(f"{path} is no baseline: not JSON: {error}") from None
+        raise ConfigError(f"{path} is not a baseline: not JSON: {error}") from None
 
-    where = f"{path} is no baseline"
+    where = f"{path} is not a baseline"
     if tables.is_deep(table):
         raise ConfigError(f"{where}: nested too deep")
     if not isinstance(table, dict):
         raise ConfigError(f"{where}: it must be a table, got {str(table)[:40]}")
 
+    # Before the conversion, so that messages name the key that the user wrote.
     tables.check_keys(table, ("made", "metrics"), where)
     tables.check_finite(table, where)
     made = tables.convert(table.get("made"), Made, "made", where)

@@ -19,15 +19,13 @@ MARKDOWN = re.compile(r"[\\`*_\[\]<>|~&#@$]")
 
 
 def junit(checked: Sequence[Checked]) -> str:
-    """Return JUnit XML: one suite, a test case for each run and each metric that was judged.
-
-    It says nothing of time, so that equal checks give equal files.
-    """
+    """Return JUnit XML: one suite, a test case for each run and each metric that was judged."""
+    # No element has a time: equal checks give equal files.
     suites = ElementTree.Element("testsuites")
     suite = ElementTree.SubElement(suites, "testsuite", name="fivebar check")
     for each in checked:
-        said = [each.broke] if each.broke else []
-        _case(suite, each.name, "run", said, each.remarks)
+        broke = [each.broke] if each.broke else []
+        _case(suite, each.name, "run", broke, each.remarks)
         for row in each.rows:
             whys = [row.why] if row.why else []
             failed = row.verdict == FAIL
@@ -48,14 +46,14 @@ def junit(checked: Sequence[Checked]) -> str:
 
 
 def _case(
-    suite: ElementTree.Element, run: str, name: str, whys: Sequence[str], said: Sequence[str]
+    suite: ElementTree.Element, run: str, name: str, whys: Sequence[str], remarks: Sequence[str]
 ) -> None:
-    """Append a test case: failed if there is a why, with what it says besides."""
+    """Append a test case, failed if there is a reason, with its remarks as output."""
     case = ElementTree.SubElement(suite, "testcase", classname=_xml(run), name=name)
     for why in whys:
         ElementTree.SubElement(case, "failure", message=_xml(why), type="check").text = _xml(why)
-    if said:
-        ElementTree.SubElement(case, "system-out").text = _xml("\n".join(said))
+    if remarks:
+        ElementTree.SubElement(case, "system-out").text = _xml("\n".join(remarks))
 
 
 def _xml(text: str) -> str:
@@ -63,13 +61,16 @@ def _xml(text: str) -> str:
 
 
 def markdown(checked: Sequence[Checked]) -> str:
-    """Return a summary: what failed or should be known, then every metric, folded away."""
+    """Return a summary in Markdown: failures and remarks, then every metric, folded away."""
     failed = sum(bool(each.failures) for each in checked)
     verdict = f"{failed} of {len(checked)} failed" if failed else f"all {len(checked)} pass"
     lines = [f"## fivebar check: {verdict}", ""]
     for each in checked:
-        said = [*(("FAIL", line) for line in each.failures), *(("note", r) for r in each.remarks)]
-        lines += [f"- **{word}** {_md(each.name)}: {_md(line)}" for word, line in said]
+        failures = [("FAIL", line) for line in each.failures]
+        remarks = [("note", line) for line in each.remarks]
+        lines += [
+            f"- **{word}** {_md(each.name)}: {_md(line)}" for word, line in [*failures, *remarks]
+        ]
     lines += ["", "<details><summary>every metric</summary>", "", *_table(checked), ""]
     return "\n".join([*lines, "</details>", "", ""])
 
@@ -79,6 +80,7 @@ def _table(checked: Sequence[Checked]) -> Iterator[str]:
     yield "| scenario | metric | limit | baseline | now | change | verdict |"
     yield "| --- | --- | ---: | ---: | ---: | ---: | --- |"
     for each in checked:
+        # Without a row of its own, a run that broke would be missing from the table.
         if each.broke or not each.rows:
             verdict = f"**{FAIL}**" if each.broke else "pass"
             yield f"| {_md(each.name)} | run | | | | | {verdict} |"
@@ -87,7 +89,7 @@ def _table(checked: Sequence[Checked]) -> Iterator[str]:
 
 
 def _cells(row: Row) -> list[str]:
-    """Return what the table says of one metric."""
+    """Return the cells of one metric's row."""
     limit = bounds(row.limit) if row.limit else ""
     then = shown(row.key, row.recorded.value) if row.recorded else ""
     cells = [SHOWN[row.key][0], limit, then, shown(row.key, row.now), row.change]
@@ -96,5 +98,5 @@ def _cells(row: Row) -> list[str]:
 
 
 def _md(text: str) -> str:
-    """Return a text of which Markdown and HTML read every character as itself."""
+    """Return a text in which no character means anything to Markdown or HTML."""
     return MARKDOWN.sub(lambda found: f"&#{ord(found[0])};", " ".join(text.split()))

@@ -25,10 +25,10 @@ class Row(NamedTuple):
     Attributes:
         key: Its dotted key.
         limit: Its limit, if the scenario sets one.
-        recorded: What the baseline has, if it does.
-        now: What was measured; None where it is undefined.
-        verdict: `PASS`, `FAIL`, `BETTER` or `NEW`; the last was moved on purpose, see `accept`.
-        why: What is wrong, or moved; "" where it passes.
+        recorded: Its value in the baseline, if it has one.
+        now: The measured value; None where it is undefined.
+        verdict: `PASS`, `FAIL`, `BETTER` or `NEW`; the last was changed on purpose, see `accept`.
+        why: What is wrong or changed; "" where it passes.
     """
 
     key: str
@@ -40,20 +40,20 @@ class Row(NamedTuple):
 
     @property
     def change(self) -> str:
-        """The change since the baseline, in percent of it; "" where there is nothing to say."""
+        """The change since the baseline in percent of it; "" if one of the two is missing."""
         if self.recorded is None or self.recorded.value is None or self.now is None:
             return ""
         return _change(self.recorded.value, self.now, self.key)
 
 
 class Checked(NamedTuple):
-    """What came of one scenario.
+    """The result of checking one scenario.
 
     Attributes:
-        name: The scenario's.
+        name: The scenario's name.
         rows: Its metrics that have a limit or a baseline.
         broke: Why the run itself failed: it diverged, or a guard tripped; "" if it did not.
-        notes: What should be known besides: no baseline, or one that was made otherwise.
+        notes: Remarks that are not failures: no baseline, or one of another platform or version.
     """
 
     name: str
@@ -69,29 +69,31 @@ class Checked(NamedTuple):
 
     @property
     def remarks(self) -> list[str]:
-        """What is no failure, but should be known: the notes, and how much got better."""
+        """Remarks that are not failures: the notes, and which metrics got better."""
         better = [SHOWN[row.key][0] for row in self.rows if row.verdict == BETTER]
-        told = f"better than its baseline: {', '.join(better)}; --update records it"
-        return [told, *self.notes] if better else self.notes
+        line = f"better than its baseline: {', '.join(better)}; --update records it"
+        return [line, *self.notes] if better else self.notes
 
 
 def compare(result: Result, baseline: Baseline | None) -> Checked:
-    """Return a run against its limits and its baseline."""
+    """Compare a run with its limits and its baseline."""
     metrics = result.metrics
     limits = {limit.key: limit for limit in result.limits}
     recorded = baseline.metrics if baseline else {}
+    # In the order of the catalogue, so that every table shows metrics alike.
     rows = [
         _row(key, limits.get(key), recorded.get(key), metrics)
         for key in SHOWN
         if key in limits or key in recorded
     ]
     broke = _broke(result)
+    # Of a run that broke, a missing baseline is the least of its problems.
     notes = [] if broke else list(_notes(baseline, metrics))
     return Checked(result.scenario.name, rows, broke, notes)
 
 
 def accept(checked: Checked) -> Checked:
-    """Return what was checked with every difference to the baseline accepted."""
+    """Return the checked scenario with every difference to the baseline accepted."""
     rows = [row if row.verdict == PASS else row._replace(verdict=NEW) for row in checked.rows]
     return checked._replace(rows=rows, notes=[])
 
@@ -102,7 +104,7 @@ def _broke(result: Result) -> str:
 
 
 def _notes(baseline: Baseline | None, metrics: Mapping[str, Any]) -> Iterator[str]:
-    """Yield what should be known of a baseline."""
+    """Yield remarks on a baseline: that it is missing, or was made otherwise."""
     if baseline is None:
         yield "no baseline: judged by its limits alone; --update records one"
         return
@@ -114,7 +116,8 @@ def _notes(baseline: Baseline | None, metrics: Mapping[str, Any]) -> Iterator[st
 def _row(
     key: str, limit: Limit | None, recorded: Recorded | None, metrics: Mapping[str, Any]
 ) -> Row:
-    """Return one metric, judged by its limit first."""
+    """Return one metric; a broken limit outranks any difference to the baseline."""
+    # A baseline may still name metrics of a ground that the scene no longer has.
     now = look_up(metrics, key) if key.split(".")[0] in metrics else None
     label = SHOWN[key][0]
     verdict = PASS
@@ -130,6 +133,7 @@ def _row(
 def _against(key: str, recorded: Recorded, now: float | None) -> tuple[str, str]:
     """Return the verdict of a metric against its recorded value, and why."""
     then = recorded.value
+    # Undefined on one side only: there is no number to hold against a tolerance.
     if then is None or now is None:
         same = then is now
         return (PASS, "") if same else (FAIL, f"{shown(key, now)}, baseline {shown(key, then)}")
@@ -147,5 +151,6 @@ def _change(then: float, now: float, key: str) -> str:
         return "0.0 %"
     if then == 0.0:
         return f"{'+' if now > 0.0 else ''}{shown(key, now)}"
+    # Rounding must not show a sign where nothing changed.
     percent = f"{100.0 * (now - then) / abs(then):+.1f} %"
     return "0.0 %" if percent in ("+0.0 %", "-0.0 %") else percent

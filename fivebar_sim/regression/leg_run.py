@@ -1,4 +1,4 @@
-"""A scenario run within somebody's test: whose controller drives it, and what may be asserted."""
+"""Scenarios run within a user's tests: loading, driving by a controller, and assertions."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from fivebar_sim.scenario import Scenario
 
 @dataclass(frozen=True, slots=True)
 class LegRun:
-    """What came of a run, and what may be asserted about it.
+    """The result of a run, with assertions.
 
     Attributes:
         result: As `fivebar_sim.run` returns it.
@@ -65,7 +65,7 @@ class LegRun:
         """Fail unless the verdict is "pass": all limits hold, and no guard tripped.
 
         Raises:
-            AssertionError: One line for every broken limit, and what the guards say that tripped.
+            AssertionError: One line for every broken limit and every guard that tripped.
             ConfigError: The scenario has no limits, so that nothing would be asserted.
         """
         __tracebackhide__ = True
@@ -82,14 +82,15 @@ class LegRun:
 
         Args:
             key: The metric's dotted key, as in [limits]: "tracking.rms".
-            low: Least value that passes; None is none.
-            high: Greatest value that passes; None is none.
+            low: Least value that passes; None is no lower bound.
+            high: Greatest value that passes; None is no upper bound.
 
         Raises:
-            AssertionError: Names the metric with its value and bounds, or what a guard says.
+            AssertionError: Names the metric with its value and bounds, or the guards that tripped.
             ArgumentError: No such metric in this run, no bound, or low > high.
         """
         __tracebackhide__ = True
+        # A scene without a ground has no metrics of one.
         known = [each for each in LIMIT_KEYS if each.split(".")[0] in self.metrics]
         if key not in known:
             raise ArgumentError(unknown("metric", key, known))
@@ -102,6 +103,7 @@ class LegRun:
         if high is not None:
             check_number("high", high, "", low=-inf if low is None else low)
 
+        # A number of a run whose physics does not hold proves nothing, whatever it is.
         tripped = guards.tripped(self.result.measured.guards)
         if tripped:
             raise AssertionError("\n  ".join([f"{self.scenario.name} fails:", *tripped]))
@@ -110,17 +112,17 @@ class LegRun:
         (judged,) = judge(self.metrics, {key: allowed})
         if not judged.ok:
             legal = bounds(judged) if high is not None else f">= {shown(key, low)}"
-            said = f"{SHOWN[key][0]}: {shown(key, judged.value)}, limit {legal}"
-            raise AssertionError(f"{self.scenario.name} fails:\n  {said}")
+            line = f"{SHOWN[key][0]}: {shown(key, judged.value)}, limit {legal}"
+            raise AssertionError(f"{self.scenario.name} fails:\n  {line}")
 
 
 @dataclass(frozen=True, slots=True)
 class LegRunner:
-    """Runs scenarios for one test: what the fixture `leg_run` is.
+    """Runs scenarios for one test: the value of the fixture `leg_run`.
 
     Attributes:
-        folder: Of the test file: scenarios are looked up beside it.
-        runs: What was run, for whoever keeps it.
+        folder: Folder of the test file; scenarios are looked up beside it.
+        runs: Results of all runs of the test, which the plugin may keep.
     """
 
     folder: Path
@@ -133,16 +135,16 @@ class LegRunner:
         controller: Setpoints | Feedback | None = None,
         settings: Sequence[str] = (),
     ) -> LegRun:
-        """Return what came of a scenario.
+        """Run a scenario and return its result.
 
         Args:
             scenario: A TOML file, relative to the test file's folder; or the name of one that
                 ships with fivebar-sim.
             controller: Drives the motors instead of the scenario's [controller].
-            settings: Changes "KEY=VALUE" with dotted keys, as those of `fivebar run --set`.
+            settings: Changes "KEY=VALUE" with dotted keys, as for `fivebar run --set`.
 
         Raises:
-            ConfigError: The scenario, a setting or the controller is none.
+            ConfigError: The scenario, a setting or the controller is not valid.
             UnreachableError: The path leaves what the leg can reach.
             DivergedError: The simulation broke down; says when.
         """
@@ -150,13 +152,15 @@ class LegRunner:
         try:
             result = rollout.run(self._load(str(scenario), controller, settings))
         except FiveBarError as error:
-            raise error.with_traceback(None) from None  # the test's line, and what is wrong
+            # Shows the test's line and what is wrong, not the inside of fivebar_sim.
+            raise error.with_traceback(None) from None
         self.runs.append(result)
         return LegRun(result)
 
     def _load(
         self, source: str, controller: Setpoints | Feedback | None, settings: Sequence[str]
     ) -> Scenario:
+        # A string is a sequence of strings too: each letter would be taken as a setting.
         if isinstance(settings, str):
             raise ConfigError(f'settings must be a list of "KEY=VALUE", got {settings!r}')
         place = self.folder / source if source.endswith(".toml") else source
