@@ -1,4 +1,4 @@
-"""Runs: a scenario is planned, simulated, measured and judged; all legs of one call at once."""
+"""Runs scenarios: plans, simulates, measures and judges them, all legs of one call at once."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ from fivebar_sim.simulation.steps import States, Watch, check_states, simulate
 
 
 class Result(NamedTuple):
-    """What came of a run.
+    """The result of a run.
 
     Attributes:
-        scenario: What was run.
+        scenario: The scenario that was run.
         record: The columns of rollout.parquet, each (N,), SI.
-        measured: What was measured and judged: all of metrics.json, with types.
+        measured: All of metrics.json, with types.
         limits: Every limit with its value.
     """
 
@@ -48,15 +48,17 @@ class Result(NamedTuple):
             RunDirectoryError: It is incomplete, or a file of it is damaged or foreign; names the
                 file.
         """
+        # Reading a run needs pyarrow, running one does not.
         from fivebar_sim.runs import stored
 
         found = stored.read(Path(path))
+        # Judged again: the scenario decides what counts, not a list that was written once.
         limits = judge(found.metrics, found.scenario.limits)
         return cls(found.scenario, found.record, found.measured, limits)
 
     @property
     def metrics(self) -> dict[str, Any]:
-        """What metrics.json says: `measured` as nested dictionaries, the same ones every time."""
+        """All of metrics.json as nested dictionaries; the same object every time."""
         return self.measured.table
 
     @property
@@ -72,13 +74,13 @@ class Result(NamedTuple):
 
 
 class Kind(NamedTuple):
-    """What plans have in common that are simulated together.
+    """What plans must have in common to be simulated together.
 
     Attributes:
         timestep: h [s].
         steps: Timesteps of the run.
         scene: The scene's kind.
-        extended: Whether the leg has an extension, so that its model has a geom more.
+        extended: Whether the leg has an extension: its model then has one geom more.
         period: Timesteps of the control period; None where all commands are known before.
     """
 
@@ -115,8 +117,8 @@ def execute(planned: Plan, watch: Watch | None = None) -> Result:
     """Return the result of one plan; see `run`.
 
     Args:
-        planned: What to simulate.
-        watch: Is shown the states as they come.
+        planned: The plan.
+        watch: Called with the states as they come.
     """
     return _result(planned, _simulated([planned], 1, watch))
 
@@ -127,8 +129,8 @@ def run_all(plans: Sequence[Plan], nthread: int = 1) -> list[Result]:
     The bits are the same as one by one.
 
     Args:
-        plans: What to simulate.
-        nthread: Threads; 0 is one for every processor.
+        plans: The plans.
+        nthread: Number of threads; 0 is one for every processor.
 
     Raises:
         DivergedError: A simulation broke down; says which, and when.
@@ -137,6 +139,7 @@ def run_all(plans: Sequence[Plan], nthread: int = 1) -> list[Result]:
     for i, planned in enumerate(plans):
         groups.setdefault(Kind.of(planned), []).append(i)
 
+    # Groups mix the order of the plans; results go back to it at the end.
     results: dict[int, Result] = {}
     for members in groups.values():
         states = _simulated([plans[i] for i in members], nthread)
@@ -147,6 +150,7 @@ def run_all(plans: Sequence[Plan], nthread: int = 1) -> list[Result]:
 
 def _simulated(plans: Sequence[Plan], nthread: int, watch: Watch | None = None) -> States:
     """Return the states of plans that may be simulated together."""
+    # Only a controller that waits for observations needs Python between the steps.
     if plans[0].setpoints is None:
         return feedback.steer(plans, nthread, watch)
     return simulate(
@@ -167,6 +171,7 @@ def _result(planned: Plan, states: States) -> Result:
         raise broken(planned, states, error) from None
 
     record = columns(planned, states)
+    # A foot that is gone leaves finite numbers behind, and metrics of nothing.
     lost = lost_path(scenario.leg, record)
     if lost is not None:
         far = f"it was {1e3 * scenario.leg.size:.4g} mm away from it at t = {lost:g} s"
@@ -174,7 +179,8 @@ def _result(planned: Plan, states: States) -> Result:
 
     try:
         measured = measure.measure(scenario, record, unrecorded(planned, states))
-    except ArgumentError as error:  # torques that no motor could have
+    except ArgumentError as error:
+        # Torques that no motor could have.
         raise broken(planned, states, DivergedError(str(error), scenario.sim.timestep)) from error
 
     limits = judge(measured.table, scenario.limits)

@@ -38,6 +38,7 @@ def measure(leg: FiveBar, record: Mapping[str, Array]) -> Branch:
     """
     q = np.stack([record[name] for name in JOINT_COLUMNS], axis=-1)
     signs = np.stack(kinematics.branch(leg, kinematics.chain_points(leg, q)), axis=-1)
+    # Beginning with the leg's own branch, a start in another one counts as a flip.
     own = np.array([*leg.mode, leg.assembly])
     flipped = np.any(np.diff(signs, axis=0, prepend=own[None]) != 0, axis=-1)
     s_A, s_E, assembly = signs[-1].tolist()

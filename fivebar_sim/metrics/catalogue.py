@@ -1,4 +1,4 @@
-"""The metrics of a run: one row each, with what it is called and how far it may move.
+"""The metrics of a run: a row for each, with its label, unit and tolerance.
 
 A new metric is a row here and the function that the row names; nothing else lists metrics.
 """
@@ -22,19 +22,20 @@ class Metric(NamedTuple):
 
     Attributes:
         key: Its dotted key in metrics.json, in SI units; "table.name" of a row with a function.
-        label: What people call it.
+        label: Name for people.
         scale: The factor from SI to the shown unit.
         unit: The shown unit.
-        tolerance: By how much it may move from a baseline besides its relative part, in its SI
-            unit; None where baselines leave it out.
-        less_is_better: Whether it fails only when it grows. Any other fails when it moves: less
+        tolerance: Absolute part of its tolerance in baselines, in its SI unit; None where baselines
+            leave it out.
+        less_is_better: Whether it fails only when it grows. All others fail when they change: less
             torque over a whole run, or another share of it, is not what the leg needs for its
-            path, until someone says so.
+            path, until someone accepts it.
         detail: Shown only where it has a limit.
         hidden_at_zero: Shown only where it has a limit or is not 0.
         function: Measures it. None where a table of metrics is measured as a whole: load, ground,
             energy and branch.
-        low: No run has a lower value; metrics.json is refused with one. Of rows with a function.
+        low: Lowest possible value of a row with a function; metrics.json with a lower one is
+            refused.
     """
 
     key: str
@@ -94,6 +95,7 @@ CATALOGUE = (
     Metric("load.torque_rms.E", "torque E RMS", 1e3, "mN m", tolerance=1e-6),
     Metric("load.torque_peak.A", "torque A peak", 1e3, "mN m", tolerance=1e-6, less_is_better=True),
     Metric("load.torque_peak.E", "torque E peak", 1e3, "mN m", tolerance=1e-6, less_is_better=True),
+    # 2e-3 of a share of steps: three steps of 1500.
     Metric("load.share_A", "load share A", 1e2, "%", tolerance=2e-3),
     Metric("load.thermal_share_A", "thermal share A", 1e2, "%", tolerance=2e-3),
     Metric("load.peak_ratio", "peak torque ratio", 1.0, "", detail=True),
@@ -130,6 +132,7 @@ CATALOGUE = (
     Metric("ground.slip", "slip in stance", 1e3, "mm", tolerance=1e-6, less_is_better=True),
     Metric("ground.foot_height_max", "foot height max", 1e3, "mm", tolerance=1e-6),
     Metric("ground.flight_max", "longest flight", 1e3, "ms", tolerance=2e-3),
+    # Works of the whole run; their sum is what the guard of the energy judges.
     Metric("energy.motor", "work of the motors", 1e3, "mJ", detail=True),
     Metric("energy.force", "work of the pushes", 1e3, "mJ", detail=True),
     Metric("energy.ground", "work of the ground", 1e3, "mJ", detail=True),
@@ -151,7 +154,7 @@ GROUND_KEYS = tuple(key for key in LIMIT_KEYS if key.startswith("ground."))
 """The metrics of scenes with a ground."""
 
 SHOWN = {metric.key: (metric.label, metric.scale, metric.unit) for metric in CATALOGUE}
-"""What a metric is called, the factor from SI to the shown unit, and that unit."""
+"""Label, factor from SI to the shown unit, and shown unit of each metric, by key."""
 
 DETAILS = tuple(metric.key for metric in CATALOGUE if metric.detail)
 """Metrics that are shown only where they have a limit."""
@@ -160,7 +163,7 @@ HIDDEN_AT_ZERO = tuple(metric.key for metric in CATALOGUE if metric.hidden_at_ze
 """Metrics that are shown only where they have a limit or are not 0."""
 
 ABSOLUTE = {metric.key: metric.tolerance for metric in CATALOGUE if metric.tolerance is not None}
-"""The metrics of a baseline, and by how much more each may move, in its own unit."""
+"""Absolute tolerance of the metrics of a baseline, in SI units, by key."""
 
 LESS_IS_BETTER = tuple(metric.key for metric in CATALOGUE if metric.less_is_better)
 """Metrics of a baseline that fail only when they grow."""
@@ -169,7 +172,7 @@ MEASURED = tuple(metric for metric in CATALOGUE if metric.function is not None)
 """The metrics with a function of their own."""
 
 SMALLER = {"mm": "um", "um": "nm"}
-"""The unit a thousand times smaller, for values that would have two zeros behind the point."""
+"""The unit a thousand times smaller, for values that would begin with 0.00."""
 
 
 def shown(key: str, value: float | None) -> str:
@@ -178,6 +181,7 @@ def shown(key: str, value: float | None) -> str:
     if value is None:
         return "undefined"
     number = scale * value
+    # 2e-5 mm tells people nothing; 20 nm does.
     while 0.0 < abs(number) < 0.01 and unit in SMALLER:
         number = 1e3 * number
         unit = SMALLER[unit]
@@ -198,6 +202,7 @@ def measure(
     """
     tables: dict[str, dict[str, float | None]] = {}
     for metric in MEASURED:
+        # No floor, no metric of it: a 0 would look measured.
         if metric.key in GROUND_KEYS and "ground_z" not in record:
             continue
         assert metric.function is not None

@@ -11,6 +11,7 @@ from fivebar_sim.metrics.tracking import root_mean_square
 
 def rms(leg: FiveBar, record: Mapping[str, Array], window: slice) -> float:
     """Return the root of the mean squared gap [m]."""
+    # The window is for the path: the loop must hold in every step.
     del leg, window
     return root_mean_square(record["gap"])
 

@@ -1,4 +1,4 @@
-"""Where the energy of a run came from and where it went, and what is left unaccounted for.
+"""The energy balance of a run: where energy came from and went, and what is unaccounted for.
 
 A step of MuJoCo takes the joint rates v at the pose q to v' by M(q) (v' - v) = h (f - c(q, v)), f
 the joint torques of all that acts and c the centripetal ones, and then moves on with v'. With
@@ -7,8 +7,8 @@ that pose is all of it if c were that of w: what a step gives away by taking c a
 -h (c(q, v) - c(q, w)) . w, is counted as a work of its own. And rates belong to the middle of the
 step that they moved the leg by, as in leapfrog: energies are those of v at q - h v / 2.
 
-So what is left is some parts in a million of what is turned over. A balance that is worse tells of
-torques, masses or constraints that are not those that acted.
+What is left is then a few parts in a million of the energy turned over. A worse balance means that
+other torques, masses or constraints acted than the record says.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from fivebar_sim.metrics.ground import contact_radius
 from fivebar_sim.metrics.json_types import Amount, Number, Table
 
 TINY = 1e-9
-"""Turned over, this [J] is nothing: the imbalance of a leg that only stands says nothing."""
+"""Energy turned over up to which the imbalance is undefined [J]: the leg only stands."""
 
 
 class Body(NamedTuple):
@@ -37,7 +37,7 @@ class Body(NamedTuple):
     Attributes:
         leg: The leg.
         payload: Point mass at the foot [kg].
-        trunk: What rides on the hip [kg]; 0 where the hip is fixed.
+        trunk: Mass that rides on the hip [kg]; 0 where the hip is fixed.
     """
 
     leg: FiveBar
@@ -46,7 +46,7 @@ class Body(NamedTuple):
 
 
 class Steps(NamedTuple):
-    """What acted on a run besides the motors, and where it began, at rest.
+    """What acted on the leg besides the motors, and where it began, at rest.
 
     Attributes:
         start: qpos at t = 0, the hip's height first where it slides, (nq,).
@@ -61,17 +61,17 @@ class Steps(NamedTuple):
 
 
 class Balance(NamedTuple):
-    """The works of each step on the leg and what it carries, and what they gained [J], each (N,).
+    """The works of each step on the leg and its load, and the gains of energy [J], each (N,).
 
     Attributes:
-        motor: Of A and E, their damping included.
-        force: Of the pushes on the foot.
-        ground: Of floor or belt.
-        constraints: What all constraints did but for the ground: the loop at C, gear friction, ends
-            of travel; negative is lost.
-        step: What MuJoCo's step gave by taking centripetal torques at its start.
-        kinetic: What the kinetic energy gained.
-        potential: What the potential energy gained.
+        motor: Work of motors A and E, including their damping.
+        force: Work of the pushes on the foot.
+        ground: Work of floor or belt.
+        constraints: Work of all other constraints: the loop at C, gear friction, ends of travel;
+            negative is lost.
+        step: Energy that MuJoCo's step gave by taking centripetal torques at its start.
+        kinetic: Gain of kinetic energy.
+        potential: Gain of potential energy.
     """
 
     motor: Array
@@ -84,7 +84,7 @@ class Balance(NamedTuple):
 
     @property
     def turnover(self) -> float:
-        """Works of motors, pushes, ground, constraints, gravity, with either sign, added up [J]."""
+        """Sum of the absolute works of motors, pushes, ground, constraints and gravity [J]."""
         acting = (self.motor, self.force, self.ground, self.constraints, self.potential)
         return float(np.sum(np.abs(acting)))
 
@@ -96,13 +96,14 @@ class Balance(NamedTuple):
 
     @property
     def given(self) -> Array:
-        """What constraints gave since they had given least [J], (N,); they can only take."""
+        """Energy that constraints gave since they had given least [J], (N,)."""
+        # They can only take: any rise of the running sum is energy from nowhere.
         so_far = np.cumsum(self.constraints)
         return so_far - np.minimum.accumulate(np.minimum(so_far, 0.0))
 
     @property
     def imbalance(self) -> float | None:
-        """Largest |unaccounted| / turnover of all times; None where next to nothing was turned."""
+        """Largest |unaccounted| / turnover; None where next to nothing was turned over."""
         if not self.turnover > TINY:
             return None
         return float(np.abs(self.unaccounted).max()) / self.turnover
@@ -148,6 +149,7 @@ class _Motion(NamedTuple):
         v = np.stack([record[name] for name in RATE_COLUMNS], axis=-1)
         q = _begun(start[-4:], q)
         v = _begun(np.zeros(4), v)
+        # A fixed hip is a hip at height 0 that never moves.
         hip, hip_dot = np.zeros((2, len(q)))
         if "hip_z" in record:
             hip = _begun(start[0], record["hip_z"])
@@ -166,6 +168,7 @@ def balance(body: Body, record: Mapping[str, Array], steps: Steps) -> Balance:
     leg = body.leg
     h = float(record["time"][0])
     m = _Motion.of(record, steps.start)
+    # Rates belong to the middle of the step that they moved the leg by; see above.
     kinetic, potential = mechanical(
         body, m.q - 0.5 * h * m.v, m.v, m.hip - 0.5 * h * m.hip_dot, m.hip_dot
     )
@@ -177,7 +180,7 @@ def balance(body: Body, record: Mapping[str, Array], steps: Steps) -> Balance:
     if "ground_z" in record:
         height = m.hip[:-1] + kinematics.chain_points(leg, m.q[:-1]).F[:, 1] - leg.foot_radius
         rolled = contact_radius(leg, height) * (m.w[:, 0] + m.w[:, 1])
-        # of the point of contact
+        # The force acts on the ball's lowest point, which also rolls.
         x = foot[:, 0] + rolled
         z = foot[:, 1] + m.lift
         ground = h * (record["ground_x"] * x + record["ground_z"] * z)
@@ -220,7 +223,7 @@ def mechanical(
 ) -> Vector:
     """Return the kinetic energy and the potential one, zero with all masses at height 0 [J], (...).
 
-    Of the open tree: the loop may be open, and the knees turn as they like.
+    They are those of the open tree: the loop may be open, and the knees turn freely.
 
     Args:
         body: What moves.

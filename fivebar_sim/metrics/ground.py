@@ -1,4 +1,4 @@
-"""What the foot does on the ground: force, slip, height, stance and flight, from the record."""
+"""The foot on the ground: force, slip, height, stance and flight, from the record."""
 
 from __future__ import annotations
 
@@ -34,27 +34,26 @@ def stands(record: Mapping[str, Array]) -> Bools:
 
 
 def height(leg: FiveBar, record: Mapping[str, Array]) -> Array:
-    """Return the height of the foot's ball above the floor [m], (N,); below 0 it sinks in."""
+    """Return the height of the foot's ball above the floor [m], (N,); below 0 in the floor."""
     return record["hip_z"] + record["foot_z"] - leg.foot_radius
 
 
 def contact_radius(leg: FiveBar, height: Array) -> Array:
-    """Return how far below the ball's centre MuJoCo has the point of contact [m].
-
-    The ball's radius less half of what it sinks in.
+    """Return the distance from the ball's centre down to MuJoCo's point of contact [m].
 
     Args:
         leg: The leg.
-        height: Of the ball above the floor, as `height` returns it [m].
+        height: Height of the ball above the floor, as `height` returns it [m].
     """
+    # MuJoCo puts the contact in the middle of the overlap.
     return leg.foot_radius + 0.5 * np.minimum(height, 0.0)
 
 
 def slid(leg: FiveBar, record: Mapping[str, Array]) -> Array:
-    """Return how far the foot slid over the floor in each step but the first [m], (N - 1,).
+    """Return the distance that the foot slid over the floor in each step but the first [m].
 
-    The ball rolls with L2, whose direction is psi_2 = theta_A + theta_B, and a belt that moves by
-    belt_x takes its point of contact along. Over a step, with r of `contact_radius`:
+    The ball rolls with L2, whose direction is psi_2 = theta_A + theta_B, and a belt carries the
+    point of contact along by belt_x. Over a step, with r of `contact_radius`, it is (N - 1,):
 
         d foot_x + r d psi_2 - d belt_x
     """
@@ -67,9 +66,9 @@ def slid(leg: FiveBar, record: Mapping[str, Array]) -> Array:
 def measure(leg: FiveBar, record: Mapping[str, Array], window: slice) -> GroundMetrics:
     """Return the metrics of the ground.
 
-    force_max, foot_height_max and flight_max (the longest time without force, that of a drop
-    included) are of the whole run, whose landing may be before the window; stance_share (of the
-    time) and slip (the way that the foot slid while it stood) are of the window.
+    force_max, foot_height_max and flight_max (the longest time without force, including the first
+    drop) are taken over the whole run, because the landing may be before the window. stance_share
+    (a part of the time) and slip (the distance slid in stance) are taken over the window.
 
     Args:
         leg: The leg.
@@ -78,6 +77,7 @@ def measure(leg: FiveBar, record: Mapping[str, Array], window: slice) -> GroundM
     """
     down = stands(record)
     h = float(record["time"][0])
+    # A foot in the air may move as it likes.
     slip = np.concatenate([[0.0], np.abs(slid(leg, record)) * down[1:]])[window]
 
     return GroundMetrics(
@@ -94,5 +94,6 @@ def measure(leg: FiveBar, record: Mapping[str, Array], window: slice) -> GroundM
 
 def _longest(chosen: Bools) -> int:
     """Return the length of the longest run of True."""
+    # Runs begin and end where False turns into True and back.
     edges = np.flatnonzero(np.diff(np.concatenate([[False], chosen, [False]])))
     return int((edges[1::2] - edges[::2]).max(initial=0))

@@ -1,9 +1,10 @@
-"""Guards: what makes a run no evidence, whatever its limits say, trips one.
+"""Guards reject runs whose physics cannot be trusted, whatever their limits say.
 
-Physics that does not hold, torque that is not there, a leg that has become another one.
+They look for physics that does not hold, torque that the motors do not have, and a leg that has
+folded the other way.
 
-A scenario may move the bounds in its table [guards]; that the leg keeps its branch and MuJoCo's
-solver converges is not up to it.
+A scenario may change the bounds in its table [guards], but not that the leg keeps its branch and
+that MuJoCo's solver converges.
 """
 
 from __future__ import annotations
@@ -26,18 +27,19 @@ from fivebar_sim.metrics.lasting import chattering, clipped
 
 
 class Guards(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """How far a run may go and still be one.
+    """The bounds within which a run counts.
 
     Attributes:
-        loop: Greatest gap of the loop at C, in parts of the leg's size.
-        ground: Deepest that the foot may sink into the floor, in parts of its ball's diameter.
-        torque: Greatest part of any second, or of a shorter run, in which a motor's torque may be
+        loop: Largest gap of the loop at C, as a part of the leg's size.
+        ground: Largest depth of the foot in the floor, as a part of its ball's diameter.
+        torque: Largest part of any second, or of a shorter run, in which a motor's torque may be
             clipped; 1 is all of it.
-        chatter: Greatest part of any second, or of a shorter run, in which a motor's torque may go
+        chatter: Largest part of any second, or of a shorter run, in which a motor's torque may go
             up and down with every command.
-        energy: Greatest imbalance of the energy, in parts of what was turned over.
-        constraints: Most that loop, gear friction and ends of travel may give, in the same parts.
-        step: Most that MuJoCo's steps may give or take by themselves, in the same parts.
+        energy: Largest imbalance of the energy, as a part of the energy turned over.
+        constraints: Largest energy that loop, gear friction and ends of travel may give, as the
+            same part.
+        step: Largest energy that MuJoCo's steps may give or take by themselves, as the same part.
     """
 
     loop: float = 0.01
@@ -58,12 +60,12 @@ class Guards(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
 
 
 class Guard(Table, frozen=True):
-    """One guard and what came of it.
+    """One guard and its result.
 
     Attributes:
-        name: What it looks at.
-        value: What was found, in SI units; None where there is nothing to find.
-        high: Greatest value that is fine.
+        name: Name of the guard.
+        value: The worst value of the run, in SI units; None where it is undefined.
+        high: Largest value that is fine.
         time: When it tripped, the first step above `high` [s]; None if it never did.
         ok: Whether it held.
     """
@@ -81,7 +83,7 @@ class Guard(Table, frozen=True):
             raise ValueError(f"ok must be {str(not self.ok).lower()} with time {self.time}")
 
     def __str__(self) -> str:
-        """Return what it says where it tripped: the bound, when, and the worst of the run."""
+        """Return the message of a guard that tripped: the bound, when, and the worst value."""
         row = ROWS[self.name]
         bound = row.what.format(row.scale * self.high)
         worst = row.worst.format(row.scale * (self.value or 0.0))
@@ -89,15 +91,15 @@ class Guard(Table, frozen=True):
 
 
 class Evidence(NamedTuple):
-    """The run that guards look at, over all of its steps.
+    """What guards look at: all steps of a run.
 
     Attributes:
-        bounds: Of the scenario.
+        bounds: The scenario's bounds.
         leg: The leg.
         record: The columns of rollout.parquet.
         branch: Branch of the last step, and when it flipped.
         saturated: Whether the torque limit clipped A and E in each step, (N, 2).
-        balance: The work of each step.
+        balance: Works and energies of each step.
         unsolved: Whether the constraint solver ran out of iterations in each step, (N,).
         command: Steps from one command of the motors to the next.
     """
@@ -113,7 +115,7 @@ class Evidence(NamedTuple):
 
 
 class Found(NamedTuple):
-    """What a guard's function found: the worst value, the bound [SI], when it tripped [s]."""
+    """The worst value and the bound, both SI, and when the guard tripped [s]."""
 
     value: float | None
     high: float
@@ -124,10 +126,10 @@ class Row(NamedTuple):
     """A guard of the catalogue.
 
     Attributes:
-        name: What people call it; its bound in a scenario, if it has one, is of that name.
-        function: Looks for it; None is for a run in which there is nothing to look for.
-        what: Said where it tripped, before the time, with the bound.
-        worst: Said after the time, with the worst value.
+        name: Name of the guard, and of its bound in a scenario, if it has one.
+        function: Finds the worst value; returns None for runs that the guard does not apply to.
+        what: First part of its message, with the bound.
+        worst: Last part of its message, with the worst value.
         scale: Factor from SI to the shown unit.
         unit: The shown unit.
     """
@@ -160,6 +162,7 @@ def tripped(guards: Sequence[Guard]) -> list[str]:
 
 
 def _left_branch(run: Evidence) -> Found:
+    # One flip is too many: what follows is another mechanism.
     return Found(float(run.branch.flips), 0.0, run.branch.first_flip)
 
 
@@ -180,6 +183,7 @@ def _unaccounted_energy(run: Evidence) -> Found:
 
 
 def _giving_constraints(run: Evidence) -> Found:
+    # Loop, friction and ends of travel can only take energy; giving some is an artefact.
     return _part(run, run.balance.given, run.bounds.constraints)
 
 
@@ -194,6 +198,7 @@ def _unsolved(run: Evidence) -> Found:
 def _in_floor(run: Evidence) -> Found | None:
     if "ground_z" not in run.record:
         return None
+    # Deeper than its own ball, the foot has gone through the floor.
     depth = np.maximum(-ground.height(run.leg, run.record), 0.0)
     return _highest(run, depth, run.bounds.ground * 2.0 * run.leg.foot_radius)
 
@@ -207,8 +212,9 @@ def _first(chosen: Bools, time: Array) -> float | None:
 
 
 def _part(run: Evidence, energy: Array, high: float) -> Found:
-    """Return the largest |energy so far|, in parts of what was turned over in the run."""
+    """Return the largest |energy so far|, as a part of the energy turned over in the run."""
     balance = run.balance
+    # A leg that only stands turns nothing over: every part of it would be rounding.
     if balance.imbalance is None:
         return Found(None, high, None)
     return _highest(run, np.abs(energy) / balance.turnover, high)
@@ -281,7 +287,7 @@ GUARDS = (
         "mm",
     ),
 )
-"""Every guard, in the order in which metrics.json has them; a new one is a row and a function."""
+"""Every guard, in the order of metrics.json; a new guard is a row and a function."""
 
 ROWS = {row.name: row for row in GUARDS}
 """The guards by name."""

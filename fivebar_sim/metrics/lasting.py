@@ -10,26 +10,40 @@ from fivebar_sim.arrays import Array, Bools
 from fivebar_sim.metrics.columns import motors
 
 WITHIN = 1.0
-"""Over this time [s] clipped and chattering steps are added up; of a shorter run, over all."""
+"""Clipped and chattering steps are counted over this time [s], or over a shorter run."""
 
 FAINT = 0.1
-"""Changes of torque by at most this part of a run's largest are too faint to be chatter."""
+"""Changes of torque up to this part of the run's largest are too faint to be chatter."""
 
 
 def clipped(saturated: Bools, time: Array) -> Array:
-    """Return in which part of the second before it the worse motor was clipped, (N,)."""
+    """Return, for each step, the part of the last second in which the worse motor was clipped.
+
+    Args:
+        saturated: Whether the torque limit clipped A and E in each step, (N, 2).
+        time: Time of each step [s], (N,).
+
+    Returns:
+        Parts in [0, 1], (N,).
+    """
+    # Of a run that is shorter than a second, the part of the whole run.
     window = _window(time)
     return _sums(saturated, window).max(axis=1) / window
 
 
 def chattering(record: Mapping[str, Array], command: int) -> Array:
-    """Return in which part of the second before it the worse motor's torque chattered, (N,).
+    """Return, for each step, the part of the last second in which the worse motor chattered, (N,).
 
-    It does in a step if it goes up and down, by more than `FAINT` of the run's largest torque, with
-    two commands one after the other: d = tau_k - tau_k-P of the other sign than P steps before, P
-    the steps of a command.
+    A step chatters if the torque goes up with one command and down with the next, by more than
+    `FAINT` of the run's largest: d = tau_k - tau_k-P has the other sign P steps before, with P the
+    steps of a command.
+
+    Args:
+        record: The columns of rollout.parquet.
+        command: P.
     """
     torque = motors(record, "torque")
+    # Whole commands apart: within a command a torque may ring without any chatter.
     d = np.zeros_like(torque)
     d[command:] = torque[command:] - torque[:-command]
     d[np.abs(d) <= FAINT * np.abs(torque).max()] = 0.0
@@ -46,6 +60,7 @@ def _window(time: Array) -> int:
 
 def _sums(values: Bools, window: int) -> Array:
     """Return the sums over the steps of a window that ends with each step, (N, 2)."""
+    # Differences of running sums: the cost does not depend on the window's width.
     so_far: Array = np.concatenate([np.zeros((1, 2)), np.cumsum(values, axis=0, dtype=float)])
     begin = np.maximum(np.arange(1, len(values) + 1) - window, 0)
     return so_far[1:] - so_far[begin]

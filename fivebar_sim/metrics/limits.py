@@ -1,4 +1,4 @@
-"""Limits on metrics, and whether a run keeps them."""
+"""Limits on metrics, and whether a run is within them."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from fivebar_sim.metrics.json_types import Number, Table
 
 
 class Limit(NamedTuple):
-    """One limit and what came of it; `ok` where low <= value <= high."""
+    """One limit with the value of a run; `ok` if low <= value <= high."""
 
     key: str
     low: float
@@ -53,6 +53,7 @@ def judge(metrics: Mapping[str, Any], limits: Mapping[str, tuple[float, float]])
     """Return every limit with its value. A metric that is undefined fails its limit."""
     judged = []
     for key, (low, high) in limits.items():
+        # An undefined value cannot show that the limit holds.
         value = look_up(metrics, key)
         judged.append(Limit(key, low, high, value, value is not None and low <= value <= high))
     return judged
@@ -63,5 +64,6 @@ def bounds(limit: Limit) -> str:
     if limit.low == -math.inf:
         return f"<= {shown(limit.key, limit.high)}"
     low, high = (shown(limit.key, bound) for bound in (limit.low, limit.high))
+    # The unit once, behind both numbers.
     unit = high.partition(" ")[2]
     return f"{low.removesuffix(unit).strip()} to {high}"

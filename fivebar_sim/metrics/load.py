@@ -1,6 +1,6 @@
 """How the two motors share the load: torques, shares, work, and one motor against the other.
 
-The torque of a step acts over the whole of it, so its work is the torque times the turn, exactly.
+The torque is constant over a step, so its work is exactly the torque times the turn.
 """
 
 from __future__ import annotations
@@ -28,23 +28,23 @@ from fivebar_sim.metrics.sharing import (
 )
 
 TINY = 1e-6
-"""Torque or work of at most this part of the window's largest counts as none: it is the rounding
-of the setpoints and the softness of the loop, and its share would say nothing."""
+"""Torque or work up to this part of the window's largest counts as zero: it comes from rounding
+of the setpoints and the softness of the loop, so its share would mean nothing."""
 
 LARGEST = 1e9
-"""Upper end of torques [N m] and angles [rad]."""
+"""Largest torque [N m] and angle [rad] that is accepted."""
 
 BINS_MAX = 1000
-"""Upper end of the number of phase bins."""
+"""Largest number of phase bins."""
 
 
 class _Steps(NamedTuple):
-    """What the motors did in every step of a window.
+    """Torques and works of every step of a window.
 
     Attributes:
         torque: (tau_A, tau_E) [N m], (N, 2).
-        work: Of either motor [J], (N, 2).
-        against: In which steps one motor drove and the other braked, (N,).
+        work: Work of each motor [J], (N, 2).
+        against: Whether one motor drove and the other braked in each step, (N,).
         peak: Largest |torque| of the window [N m].
         timestep: [s].
     """
@@ -67,26 +67,27 @@ def measure(
 ) -> dict[str, Any]:
     """Return how motors A and E shared the load over a window of N steps.
 
-    With tau the torque of a motor and W = tau (theta after the step - theta before it), sums over
-    the steps, positive and negative ones apart where it says so:
+    With tau the torque of a motor, W = tau (theta after the step - theta before it), and sums over
+    the steps:
 
         torque_rms = sqrt(mean tau^2),   torque_peak = max |tau|,   of A and of E
         share_A = sum |tau_A| / (sum |tau_A| + sum |tau_E|),   thermal_share_A the same of tau^2
         peak_ratio, rms_ratio = the larger of the two motors' / the smaller, so 1 is even
         work.A.positive = sum max(W_A, 0),   negative = sum min(W_A, 0),   net = their sum
         opposing: of the steps with W_A W_E < 0, one motor driving and the other braking,
-            fraction = how many of all,   first = start of the first, from the window's [s],
-            energy = sum min(|W_A|, |W_E|), what went from one motor to the other [J]
+            fraction = their part of all,   first = start of the first, from the window's [s],
+            energy = sum min(|W_A|, |W_E|), which went from one motor to the other [J]
 
-    What is not defined is None: a share where neither torque passes `TINY` of the window's peak, a
-    ratio where the smaller does not, `first` if there is none, and everything where no step is.
+    Undefined values are None: a share where neither torque is above `TINY` of the window's peak, a
+    ratio where the smaller one is not, `first` if no motor opposed, and everything over no steps.
 
     Args:
         torque: (tau_A, tau_E) of every step [N m], (N, 2), N at least 1.
         theta: (theta_A, theta_E) before the first step and after every one [rad], (N + 1, 2);
             continuous, not wrapped.
         timestep: [s].
-        stance: In which steps the foot stands, (N,) bools: "stance" is then the same in those.
+        stance: Whether the foot stands in each step, (N,) bools: "stance" then has the same values
+            over those steps alone.
         phase: Phase of every step in its gait cycle, in [0, 1), (N,): "phase" then has share_A and
             torque_rms of A and of E in each bin.
         bins: Number of bins; bin i is [i, i + 1) / bins.
@@ -110,6 +111,7 @@ def sharing(
     """Return what `measure` does, with a type: the arguments and errors are the same."""
     steps = _steps(torque, theta, timestep)
     rows = len(steps.torque)
+    # All steps of the window first: their peak decides what counts as zero in any part of it.
     found = Sharing(**msgspec.structs.asdict(_over(steps, np.ones(rows, dtype=bool))))
 
     if stance is not None:
@@ -177,6 +179,7 @@ def _over(steps: _Steps, chosen: Bools) -> Share:
     floor = TINY * steps.peak
     rms = _rms(tau)
     peak = np.abs(tau).max(axis=0)
+    # Positive work is driving, negative braking; their sum would hide both.
     given = np.maximum(work, 0.0).sum(axis=0)
     taken = np.minimum(work, 0.0).sum(axis=0)
 
@@ -215,7 +218,8 @@ def _histogram(steps: _Steps, phase: ArrayLike, bins: int) -> Phase:
         i = first_index(bad)
         raise ArgumentError(f"phase must be in [0, 1), got {float(cycle[i])!r}{at(i)}")
 
-    bin_of = (cycle * bins).astype(int)  # below bins: the float before 1 does not round up to it
+    # Always below bins: even the float before 1 does not round up to it.
+    bin_of = (cycle * bins).astype(int)
     parts = [steps.torque[bin_of == i] for i in range(bins)]
     rms = [_named(_rms(part)) if len(part) else Motors(A=None, E=None) for part in parts]
 
@@ -227,13 +231,15 @@ def _histogram(steps: _Steps, phase: ArrayLike, bins: int) -> Phase:
 
 def _against(work: Array) -> Bools:
     """Return in which steps one motor gives work and the other takes it, both more than `TINY`."""
+    # Both must be real work: next to nothing has a sign too.
     amount = np.abs(work)
     real = (amount > TINY * amount.max()).all(axis=1)
     return real & (np.signbit(work[:, 0]) != np.signbit(work[:, 1]))
 
 
 def _rms(tau: Array) -> Array:
-    """Return the root of the mean square of each column; scaled, so no square underflows."""
+    """Return the root of the mean square of each column."""
+    # Scaled by the peak, so that no square underflows.
     peak = float(np.abs(tau).max())
     return peak * np.sqrt(np.mean((tau / peak) ** 2, axis=0)) if peak > 0.0 else np.zeros(2)
 

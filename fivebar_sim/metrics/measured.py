@@ -68,9 +68,10 @@ def of(
         branch: Which way the leg was folded.
         guards: Every guard of the run.
         warnings: Number of MuJoCo's warnings.
-        ground: What the foot did on the ground; unset where there is none.
+        ground: Metrics of the foot on the ground; unset where there is none.
     """
     tables: dict[str, Any] = {"load": load, "energy": energy, "branch": branch, "ground": ground}
+    # A row of the catalogue may add to a table that is measured as a whole.
     for table, values in rows.items():
         own = msgspec.structs.asdict(tables[table]) if table in tables else {}
         tables[table] = KINDS[table](**own, **values)
@@ -113,6 +114,7 @@ def kinds(rows: Sequence[Metric]) -> dict[str, type[Table]]:
     tables: dict[str, list[tuple[str, Any]]] = {}
     for row in rows:
         table, _, name = row.key.partition(".")
+        # JSON has no infinity: a metric without a lower bound still has one.
         low = max(row.low, -LARGEST)
         number = Optional[Annotated[float, msgspec.Meta(ge=low, le=LARGEST)]]  # noqa: UP045
         tables.setdefault(table, []).append((name, number))

@@ -1,4 +1,4 @@
-"""How far the foot is from its path, when it left it, and when it was lost."""
+"""The distance of the foot from its path, and when it left it or was lost."""
 
 from __future__ import annotations
 
@@ -16,19 +16,20 @@ def tracking_error(record: Mapping[str, Array]) -> Array:
 
 
 def lost_path(leg: FiveBar, record: Mapping[str, Array]) -> float | None:
-    """Return when the foot first was farther from its target than the leg is long [s], or None."""
+    """Return when the foot was first farther from its target than the leg's size [s], or None."""
     lost = tracking_error(record) > leg.size
     return float(record["time"][np.argmax(lost)]) if lost.any() else None
 
 
 def left_path(leg: FiveBar, record: Mapping[str, Array], by: float) -> float:
-    """Return when the foot left its path [s]: the last time within a tenth of the leg's size of it.
+    """Return when the foot left its path [s]: the last time that it was near its target.
 
     Args:
         leg: The leg.
         record: The columns of rollout.parquet.
         by: When it was lost, or the simulation broke down [s].
     """
+    # Near is a tenth of the leg's size.
     near = (tracking_error(record) <= 0.1 * leg.size) & (record["time"] <= by)
     return float(record["time"][np.flatnonzero(near)[-1]]) if near.any() else 0.0
 
