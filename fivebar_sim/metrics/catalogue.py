@@ -132,7 +132,7 @@ CATALOGUE = (
     Metric("ground.slip", "slip in stance", 1e3, "mm", tolerance=1e-6, less_is_better=True),
     Metric("ground.foot_height_max", "foot height max", 1e3, "mm", tolerance=1e-6),
     Metric("ground.flight_max", "longest flight", 1e3, "ms", tolerance=2e-3),
-    # Works of the whole run; their sum is what the guard of the energy judges.
+    # Works and gains of the whole run: the guard of the energy balances them.
     Metric("energy.motor", "work of the motors", 1e3, "mJ", detail=True),
     Metric("energy.force", "work of the pushes", 1e3, "mJ", detail=True),
     Metric("energy.ground", "work of the ground", 1e3, "mJ", detail=True),

@@ -78,6 +78,7 @@ def _limits(run: StoredRun) -> str:
         (SHOWN[limit.key][0], bounds(limit), shown(limit.key, limit.value), html.verdict(limit.ok))
         for limit in numbers.limits(run)
     ]
+
     for guard in run.measured.guards:
         row = guards.ROWS[guard.name]
         allowed = f"<= {row.show(guard.high)}"

@@ -52,6 +52,7 @@ def measure(scenario: Scenario, record: Mapping[str, Array], besides: Unrecorded
     # qpos may begin with the hip's height; its last four are A, B, E, D.
     start = besides.steps.start[-4::2]
     saturated = besides.saturated
+
     body = energy.Body(leg, scenario.payload, scenario.trunk)
     balance = energy.balance(body, record, besides.steps)
     folded = branch.measure(leg, record)
@@ -65,6 +66,7 @@ def measure(scenario: Scenario, record: Mapping[str, Array], besides: Unrecorded
         unsolved=besides.unsolved,
         command=scenario.command,
     )
+
     window = scenario.window
     grounded = "ground_z" in record
     return measured.of(

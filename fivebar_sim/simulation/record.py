@@ -109,10 +109,12 @@ def _surroundings(planned: Plan, states: States, begin: int) -> Record:
     scene = planned.scenario.scene
     steps = states.time.shape[1]
     record: Record = {}
+
     if isinstance(scene, Ground):
         hip = (states.qpos[0, :, 0], states.qvel[0, :, 0])
         record |= dict(zip(HIP_COLUMNS, hip, strict=True))
         record |= dict(zip(GROUND_COLUMNS, states.ground[0].T, strict=True))
+
     if isinstance(scene, Treadmill):
         record[BELT_COLUMN] = (
             -(scene.speed or 0.0) * planned.motion.time[begin + 1 : begin + steps + 1]
