@@ -55,9 +55,11 @@ class Series(NamedTuple):
         return self.path.split("/")[0]
 
 
-MOTOR_COLOURS = dict(zip(MOTORS, (ORANGE, BLUE), strict=True))
-ANGLE_COLOURS = dict(zip(JOINT_COLUMNS, (ORANGE, LIGHT_ORANGE, BLUE, LIGHT_BLUE), strict=True))
-COMMAND_COLOURS = dict(zip(COMMAND_COLUMNS, (RED, GREEN), strict=True))
+MOTOR_COLOURS: dict[str, Colour] = dict(zip(MOTORS, (ORANGE, BLUE), strict=True))
+ANGLE_COLOURS: dict[str, Colour] = dict(
+    zip(JOINT_COLUMNS, (ORANGE, LIGHT_ORANGE, BLUE, LIGHT_BLUE), strict=True)
+)
+COMMAND_COLOURS: dict[str, Colour] = dict(zip(COMMAND_COLUMNS, (RED, GREEN), strict=True))
 
 
 def series(scenario: Scenario, record: Record) -> Iterator[Series]:
