@@ -20,6 +20,7 @@ from typing import Any
 from fivebar_sim.checks import check_number
 from fivebar_sim.errors import ConfigError, GeometryError, unknown
 from fivebar_sim.files import presets
+from fivebar_sim.links import Link, ball, capsule, combined, moved
 
 Mode = tuple[int, int]
 Four = tuple[float, float, float, float]

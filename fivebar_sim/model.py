@@ -21,7 +21,8 @@ from fivebar_sim.errors import ArgumentError, GeometryError, unknown
 from fivebar_sim.files import resources
 from fivebar_sim.geometry import LONGEST, FiveBar
 from fivebar_sim.integrator import CONNECT, Integrator, solref
-from fivebar_sim.kinematics.stops import stops_at_C
+from fivebar_sim.kinematics.stops import stops_at_B, stops_at_C
+from fivebar_sim.links import Link, combined
 from fivebar_sim.metrics.columns import JOINTS, MOTORS
 from fivebar_sim.scenario.scenes import Ground, Payload, Scene, Treadmill, named
 

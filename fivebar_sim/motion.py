@@ -125,11 +125,8 @@ def poses(leg: FiveBar, foot: Array) -> Array:
     rest = kinematics.home(leg)
     still = np.zeros_like(foot)
     at_rest = np.zeros(len(foot))  # every pose is one at t = 0
-    try:
-        angles = kinematics.joint_motion(leg, foot, still, still).q
-    except UnreachableError as error:
-        raise _out_of_reach(leg, foot, at_rest, error) from None
-
+    _check_reach(leg, foot, at_rest)
+    angles = kinematics.joint_motion(leg, foot, still, still).q
     q = in_turn(leg, rest, angles, angles)
     q = in_range(q, q, q)
     _check_stops(leg, rest, foot, at_rest, q)
@@ -258,7 +255,7 @@ def _out_of_reach(
     far = np.hypot(*foot[k]) > 100.0 * leg.size
     hint = "; positions are in metres: were these in mm?" if far else ""
     return UnreachableError(
-        f"{lost} is {1e3 * out:.3g} mm out; the nearest reachable point is {_mm(nearest)}",
+        f"{lost} is {1e3 * out:.3g} mm out; the nearest reachable point is {_mm(nearest)}{hint}",
         index,
     )
 

@@ -20,6 +20,7 @@ from fivebar_sim import FiveBar, kinematics, model, motion, rollout, scenario
 from fivebar_sim.arrays import Array
 from fivebar_sim.errors import GeometryError, SingularError, UnreachableError
 from fivebar_sim.geometry import MODES
+from fivebar_sim.kinematics.stops import angle_at_C
 from fivebar_sim.paths import Ellipse, Line
 
 STEPS = 20
@@ -150,7 +151,7 @@ def test_no_stop_of_the_model_acts_on_a_planned_path() -> None:
         built = model.build(leg)
         low, high = built.jnt_range.T
         assert np.all((q > low) & (q < high)), leg
-        at_C = kinematics.stops.angle_at_C(q)
+        at_C = angle_at_C(q)
         assert np.all((at_C > built.tendon_range[0, 0]) & (at_C < built.tendon_range[0, 1])), leg
         planned += 1
 

@@ -19,6 +19,7 @@ from fivebar_sim.files import resources
 from fivebar_sim.geometry import FiveBar
 from fivebar_sim.integrator import Integrator
 from fivebar_sim.metrics.columns import JOINTS
+from fivebar_sim.paths import Line
 from fivebar_sim.rollout import Result
 from fivebar_sim.scenario import Scenario, scenes
 from fivebar_sim.scenario.scenes import Air, Ground, Payload, Rail, Scene, Treadmill

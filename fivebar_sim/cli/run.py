@@ -58,9 +58,9 @@ def _viewer(address: str | None) -> str:
     from fivebar_sim.render import screen
 
     if address is not None:
-        return live.checked(address)
-    screen.check("--live-at shows the run in a viewer that listens already")
-    return live.spawned()
+        return live.check_address(address)
+    screen.check("--live-at shows the run in a viewer that already listens")
+    return live.spawn_viewer()
 
 
 def _execute(planned: Plan, viewer: str | None) -> Result:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from fivebar_sim import kinematics
-from fivebar_sim.arrays import Array, as_pairs, finite, together
+from fivebar_sim.arrays import Array, as_pairs, broadcast, finite
 from fivebar_sim.checks import check_number
 from fivebar_sim.dynamics import motion, stepwise
 from fivebar_sim.dynamics.chain import Chain, Vector, cross, placed

@@ -100,4 +100,5 @@ def in_range(q: Array, low: Array, high: Array) -> Array:
 
 def _fits(low: Array, high: Array) -> Bools:
     """Return where both motors stay in their range."""
-    return ((low >= -MOTOR_RANGE) & (high <= MOTOR_RANGE))[..., [0, 2]].all(axis=-1)
+    fits = (low >= -MOTOR_RANGE) & (high <= MOTOR_RANGE)
+    return fits[..., 0] & fits[..., 2]

@@ -124,7 +124,7 @@ class Csv(FootPath, frozen=True, tag="csv", dict=True):
         return _Curve(CubicSpline(time, foot, bc_type="periodic"), track.span, float(time[-1]))
 
 
-def _closed(track: TimedPairs, period: float | None, where: str) -> TimedPairs:
+def _close_loop(track: TimedPairs, period: float | None, where: str) -> TimedPairs:
     """Return a track whose last point is its first, one period later."""
     time, foot = track
     span = track.span

@@ -28,7 +28,7 @@ def summary(
         lines += [f"## {_cell(label)}: {measured.verdict.upper()}", ""]
         tripped = [f"- {said}" for said in guards.tripped(measured.guards)]
         lines += [*tripped, ""] if tripped else []
-        lines += [*_limits(_judged(measured.table, own)), ""]
+        lines += [*_limits(_judge_all(measured.table, own)), ""]
 
     names = [_cell(label) for label in labels] if len(labels) > 1 else ["value"]
     lines += [f"| metric | {' | '.join(names)} |", f"|:--|{'--:|' * len(names)}"]

@@ -216,7 +216,7 @@ def _metrics(runs: Sequence[StoredRun]) -> str:
         head.append(Cell(f'<span class="swatch" style="background: {tint}"></span>{text(name)}'))
 
     rows: list[list[object]] = [
-        ["verdict", *(html.judged(run.measured.verdict == "pass") for run in runs)],
+        ["verdict", *(html.verdict(run.measured.verdict == "pass") for run in runs)],
         ["guards that tripped", *(_tripped(run) for run in runs)],
     ]
     limits = [{limit.key: limit for limit in numbers.limits(run)} for run in runs]

@@ -83,7 +83,7 @@ def _limits(run: StoredRun) -> str:
         row = guards.ROWS[guard.name]
         allowed = f"<= {row.show(guard.high)}"
         value = row.show(guard.value)
-        rows.append((f"guard {row.name}", allowed, value, html.judged(guard.ok)))
+        rows.append((f"guard {row.name}", allowed, value, html.verdict(guard.ok)))
     return html.table(
         "The run passes if all of these hold.", ("metric", "limit", "value", ""), rows
     )

@@ -274,4 +274,4 @@ def _sound(states: States, timestep: float) -> Bools:
 def _moves(states: States) -> Bools:
     """Return which states are finite and slow enough."""
     # NaN and inf are not below the limit either.
-    return np.isfinite(states.qpos).all(-1) & (np.abs(states.qvel) < SPEED_LIMIT).all(-1)
+    return np.isfinite(states.qpos).all(-1) & (np.abs(states.qvel).max(-1) < SPEED_LIMIT)
