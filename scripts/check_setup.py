@@ -133,6 +133,12 @@ def difference(found: str, wanted: dict[str, str]) -> list[str]:
     return [f"{name}: locked {wanted.get(name)}, installed {have.get(name)}" for name in wrong]
 
 
+def leave_out(folder: str, names: list[str]) -> set[str]:
+    """Return what a copy of the checkout leaves out; fivebar_sim has a package called runs too."""
+    written = {"build", "runs"} if Path(folder) == ROOT else set[str]()
+    return {name for name in names if name.startswith(".") or name in {"__pycache__", *written}}
+
+
 def check(python: str, pip: str, kind: str, install: bool, env: dict[str, str]) -> list[str]:
     """Return what one set-up, with one Python and pip, would install or installs wrongly."""
     full = ask(python, "-c", "import platform; print(platform.python_version())", cwd=ROOT, env={})
@@ -143,8 +149,7 @@ def check(python: str, pip: str, kind: str, install: bool, env: dict[str, str]) 
 
     with tempfile.TemporaryDirectory() as folder:
         copy = Path(folder) / "clone"
-        ignore = shutil.ignore_patterns(".*", "build", "runs", "__pycache__")
-        shutil.copytree(ROOT, copy, ignore=ignore)
+        shutil.copytree(ROOT, copy, ignore=leave_out)
         ask(python, *make, cwd=copy, env=env)
         again = ask(python, *make, cwd=copy, env=env)
         bin = copy / ".venv" / "bin"
