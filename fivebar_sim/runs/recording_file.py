@@ -7,6 +7,7 @@ import re
 import tempfile
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from importlib.metadata import version
 from pathlib import Path
 
 from fivebar_sim.errors import ConfigError
@@ -95,10 +96,8 @@ def is_readable(path: Path) -> bool:
 
 def is_newer(path: Path) -> bool:
     """Return whether a recording was written by a newer Rerun than the installed one."""
-    import rerun
-
     with path.open("rb") as file:
         head = file.read(8)
     # The header is b"RRF2", then major, minor and patch as one byte each, and one of pre-releases.
-    here = [int(part) for part in re.findall(r"\d+", rerun.__version__)[:3]]
+    here = [int(part) for part in re.findall(r"\d+", version("rerun-sdk"))[:3]]
     return list(head[4:7]) > here
