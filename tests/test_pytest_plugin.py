@@ -16,6 +16,7 @@ from hypothesis import strategies as st
 from shell import ELLIPSE
 
 from fivebar_sim import pytest_plugin
+from fivebar_sim.report import look
 from fivebar_sim.runs import stored
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -35,34 +36,58 @@ KEPT = {
 }
 
 Session = Callable[..., str]
+PYTEST = ["-p", pytest_plugin.__name__, "-W", "error", "--import-mode=importlib"]
 
 
 @pytest.fixture
-def session(tmp_path: Path) -> Session:
-    """Return a function that runs tests in a repository and returns what pytest said."""
+def repository(tmp_path: Path) -> Path:
+    """Return the folder of the tests of a repository, with two scenarios."""
     (tmp_path / "pyproject.toml").write_text("[tool.pytest.ini_options]\n", encoding="utf-8")
     tests = tmp_path / "tests"
     tests.mkdir()
     (tests / "mine.toml").write_text(FAST, encoding="utf-8")
     (tests / "strict.toml").write_text(FAST + LIMITS, encoding="utf-8")
+    return tests
 
-    def run(source: str, *options: str, failed: int = 0, passed: int = 0, errors: int = 0) -> str:
-        (tests / "test_mine.py").write_text(LAW + source, encoding="utf-8")
-        ended = subprocess.run(
-            [sys.executable, "-m", "pytest", "-p", pytest_plugin.__name__, "-W", "error", *options],
-            cwd=tmp_path,
-            env={**os.environ, "PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1"},
-            capture_output=True,
-            text=True,
-        )
-        assert "INTERNALERROR" not in ended.stdout + ended.stderr
-        for count, what in ((failed, "failed"), (passed, "passed"), (errors, "error")):
-            found = re.search(rf"(\d+) {what}", ended.stdout)
-            assert int(found[1] if found else 0) == count, ended.stdout + ended.stderr
-        assert ended.returncode == bool(failed or errors)
-        return ended.stdout
+
+@pytest.fixture
+def session(
+    repository: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> Session:
+    """Return a function that runs tests in a repository and returns what pytest said.
+
+    Within this process, which has imported all that the runs need; that a user's own process does
+    so is `test_passing_tests_leave_nothing`.
+    """
+    monkeypatch.chdir(repository.parent)
+    monkeypatch.setenv("PYTEST_DISABLE_PLUGIN_AUTOLOAD", "1")
+    monkeypatch.delenv("PYTEST_ADDOPTS", raising=False)
+
+    def run(source: str, *options: str, **counts: int) -> str:
+        (repository / "test_mine.py").write_text(LAW + source, encoding="utf-8")
+        capfd.readouterr()
+        with monkeypatch.context() as patch:
+            for name in ("path", "meta_path"):
+                patch.setattr(sys, name, list(getattr(sys, name)))
+            status = pytest.main([*PYTEST, *options])
+        for name in ("tests.test_mine", "tests"):  # the next one is another file
+            sys.modules.pop(name, None)
+        out, err = capfd.readouterr()
+        return counted(status, out, err, **counts)
 
     return run
+
+
+def counted(
+    status: int, out: str, err: str, *, failed: int = 0, passed: int = 0, errors: int = 0
+) -> str:
+    """Return what pytest said, which must be that so many tests ended so."""
+    assert "INTERNALERROR" not in out + err
+    for count, what in ((failed, "failed"), (passed, "passed"), (errors, "error")):
+        found = re.search(rf"(\d+) {what}", out)
+        assert int(found[1] if found else 0) == count, out + err
+    assert status == bool(failed or errors)
+    return out
 
 
 def errors(said: str) -> list[str]:
@@ -75,9 +100,9 @@ def test_entry_point_is_the_plugin() -> None:
     assert project["entry-points"]["pytest11"] == {"fivebar": pytest_plugin.__name__}
 
 
-def test_passing_tests_leave_nothing(session: Session, tmp_path: Path) -> None:
-    said = session(
-        """
+def test_passing_tests_leave_nothing(repository: Path, tmp_path: Path) -> None:
+    """In a process of their own, as a user starts it."""
+    source = """
 import sys
 import pytest
 
@@ -113,14 +138,24 @@ def test_runs_are_forgotten(request):
 
     kept = [item.stash[RUNS] for item in request.session.items if RUNS in item.stash]
     assert kept == [[], [], []]
-""",
-        passed=4,
+"""
+    (repository / "test_mine.py").write_text(LAW + source, encoding="utf-8")
+    ended = subprocess.run(
+        [sys.executable, "-m", "pytest", *PYTEST],
+        cwd=tmp_path,
+        env={**os.environ, "PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1"},
+        capture_output=True,
+        text=True,
     )
+    said = counted(ended.returncode, ended.stdout, ended.stderr, passed=4)
     assert "1 xfailed" in said
     assert not (tmp_path / "fivebar-artifacts").exists()
 
 
-def test_failed_test_says_what_broke_and_keeps_its_runs(session: Session, tmp_path: Path) -> None:
+def test_failed_test_says_what_broke_and_keeps_its_runs(
+    session: Session, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(look, "png", lambda figure: b"drawn")  # real ones: the test below
     source = """
 import pytest
 
@@ -155,7 +190,7 @@ def test_range(leg_run):
     for place in places:
         assert {file.name for file in place.iterdir()} == KEPT
         assert f"kept in {place.relative_to(tmp_path)} (recording.rrd" in said
-        assert (place / "tracking-error.png").read_bytes().startswith(b"\x89PNG")
+        assert (place / "tracking-error.png").read_bytes() == b"drawn"
         stored.read(place)
 
     (folder / "mine.txt").touch()
@@ -195,6 +230,8 @@ def test_bad(result):
     assert "AssertionError: assert 'pass' == 'fail'" in said
     for place in places:
         assert said.count(f"kept in {place.relative_to(tmp_path)}") == 1
+        for picture in place.glob("*.png"):
+            assert picture.read_bytes().startswith(b"\x89PNG")
 
 
 def test_place_that_cannot_be_written_does_not_end_the_session(
