@@ -127,7 +127,7 @@ def test_torques_give_the_scenarios_states() -> None:
 
 def test_feedforward_policy_tracks_as_the_run_does() -> None:
     """The servo with torque feedforward, wrapped as a policy: `fivebar run`'s tracking error."""
-    wanted = Scenario.load("classic-ellipse", ["controller.feedforward=torque"])
+    wanted = Scenario.load("classic-ellipse", ["controller.feedforward=torque", "duration=0.8"])
     h = wanted.sim.timestep
     env = LegEnv(task_of("track", wanted, period=h))
     plan = motion.plan(wanted.leg, wanted.path, wanted.steps, h)
