@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import functools
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
@@ -69,11 +70,31 @@ def when(parents: Iterable[ast.AST]) -> str:
     return kind
 
 
+def blocks(node: ast.AST) -> Iterator[ast.AST]:
+    """Yield what stands directly within a node: expressions, which hold no statement, left out."""
+    for name in ("body", "handlers", "cases", "orelse", "finalbody"):
+        yield from getattr(node, name, ())
+
+
+def within(node: ast.AST) -> Iterator[ast.stmt]:
+    """Yield every statement within a node."""
+    for each in blocks(node):
+        if isinstance(each, ast.stmt):
+            yield each
+        yield from within(each)
+
+
+@functools.lru_cache(maxsize=1)
+def parsed(source: str) -> ast.Module:
+    """Return a source's tree, once for all that is asked of it."""
+    return ast.parse(source)
+
+
 def statements(node: ast.AST, parents: tuple[ast.AST, ...] = ()) -> Iterator[tuple[ast.AST, str]]:
     """Yield every import within a node, and when it happens."""
     if isinstance(node, ast.Import | ast.ImportFrom):
         yield node, when(parents)
-    for child in ast.iter_child_nodes(node):
+    for child in blocks(node):
         yield from statements(child, (*parents, node))
 
 
@@ -172,11 +193,9 @@ def sizes(root: Path) -> Counter[str]:
 def length(node: ast.AST) -> int:
     """Return the number of statements within a node, without imports and docstrings."""
     return sum(
-        isinstance(each, ast.stmt)
-        and each is not node
-        and not isinstance(each, ast.Import | ast.ImportFrom)
+        not isinstance(each, ast.Import | ast.ImportFrom)
         and not (isinstance(each, ast.Expr) and isinstance(each.value, ast.Constant))
-        for each in ast.walk(node)
+        for each in within(node)
     )
 
 
@@ -184,7 +203,7 @@ def long_functions(source: str) -> list[str]:
     """Return "name: statements" of the functions that are too long."""
     return [
         f"{node.name}: {length(node)}"
-        for node in ast.walk(ast.parse(source))
+        for node in within(parsed(source))
         if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef)
         and length(node) > MOST_IN_A_FUNCTION
     ]
@@ -194,7 +213,7 @@ def dense_functions(source: str) -> list[str]:
     """Return the functions whose body has 12 lines or more, none of them blank or a comment."""
     lines = source.splitlines()
     found = []
-    for node in ast.walk(ast.parse(source)):
+    for node in within(parsed(source)):
         if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
             body = node.body[1:] if ast.get_docstring(node) else node.body
             text = lines[body[0].lineno - 1 : body[-1].end_lineno] if body else []
@@ -207,7 +226,7 @@ def dense_functions(source: str) -> list[str]:
 def double_assignments(source: str) -> list[int]:
     """Return the lines of `a, b = x, y`; a swap, with the left's names on the right, is none."""
     found = []
-    for node in ast.walk(ast.parse(source)):
+    for node in within(parsed(source)):
         if isinstance(node, ast.Assign) and isinstance(node.value, ast.Tuple):
             target = node.targets[0]
             unpacks = any(isinstance(each, ast.Starred) for each in node.value.elts)
