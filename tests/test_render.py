@@ -15,9 +15,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 from PIL import Image
-from shell import Shell
+from shell import ELLIPSE, Shell
 
-from fivebar_sim import FiveBar, kinematics
+from fivebar_sim import FiveBar, kinematics, rollout
 from fivebar_sim.arrays import Array
 from fivebar_sim.errors import ConfigError, RunDirectoryError
 from fivebar_sim.files import resources
@@ -30,7 +30,7 @@ from fivebar_sim.render import scene as render_scene
 from fivebar_sim.render.replay import Replay, Span, replay
 from fivebar_sim.scenario import Scenario
 
-SMALL = ("--width", "128", "--height", "96")
+SMALL = ("--width", "64", "--height", "64")  # the smallest that is legal
 SCENES = {
     "air": {"kind": "air"},
     "payload": {"kind": "payload", "mass": 0.1},
@@ -170,39 +170,54 @@ def test_camera_sees_all_of_the_motion() -> None:
         assert 0.6 < max(across.max(), up.max()) < 1.0
 
 
+@pytest.fixture(scope="module")
+def written(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return the run directory of a short run."""
+    folder = tmp_path_factory.mktemp("run")
+    (folder / "short.toml").write_text(ELLIPSE, encoding="utf-8")
+    return rollout.run(Scenario.load(folder / "short.toml")).write(folder / "mine")
+
+
+@pytest.fixture
+def recorded(shell: Shell, written: Path) -> Shell:
+    """Return a shell in whose folder it is."""
+    shutil.copytree(written, shell.folder / "mine")
+    return shell
+
+
 @pytest.mark.usefixtures("drawing")
-def test_files_of_a_run(shell: Shell) -> None:
-    assert shell("run", "short.toml", "--out", "mine", "--quiet").status == 0
-    said = shell("render", "mine", "--out", "leg.gif", *SMALL)
+def test_files_of_a_run(recorded: Shell) -> None:
+    shell = recorded
+    command = ("render", "mine", "--out", "leg.gif", "--fps", "12", *SMALL)
+    said = shell(*command)
     assert said.status == 0
-    assert said.out.startswith("drew 8 frames of short into leg.gif: ")  # 0.25 s at 30 a second
+    assert said.out.startswith("drew 3 frames of short into leg.gif: ")  # of 0.25 s
     with Image.open("leg.gif") as film:
-        assert (film.size, film.info["loop"]) == ((128, 96), 0)
+        assert (film.size, film.info["loop"]) == ((64, 64), 0)
         shown = []
         for k in range(getattr(film, "n_frames", 1)):
             film.seek(k)
             shown.append(film.info["duration"])
-    assert (len(shown), sum(shown)) == (8, 250)
+    assert (len(shown), sum(shown)) == (3, 250)
     first = Path("leg.gif").read_bytes()
-    assert shell("render", "mine", "--out", "leg.gif", *SMALL).status == 0
+    assert shell(*command).status == 0
     assert Path("leg.gif").read_bytes() == first
     assert shell("render", "mine", "--out", "at.PNG", "--at", "0.3", *SMALL).status == 0
     with Image.open("at.PNG") as picture:
-        assert picture.size == (128, 96)
+        assert picture.size == (64, 64)
     assert {"leg.gif", "at.PNG"} <= shell.names()
     assert not [name for name in shell.names() if name.startswith(".")]
 
 
 @pytest.mark.usefixtures("drawing")
 @pytest.mark.skipif(shutil.which("ffprobe") is None, reason="no ffmpeg here")
-def test_film_shows_all_of_the_run(shell: Shell) -> None:
-    assert shell("run", "short.toml", "--out", "mine", "--quiet").status == 0
-    options = ("--fps", "20", "--speed", "0.5", *SMALL)
-    assert shell("render", "mine", "--out", "leg.mp4", *options).status == 0
+def test_film_shows_all_of_the_run(recorded: Shell) -> None:
+    options = ("--fps", "10", "--speed", "0.5", *SMALL)
+    assert recorded("render", "mine", "--out", "leg.mp4", *options).status == 0
     wanted = "stream=width,height,r_frame_rate,nb_frames"
     probe = ["ffprobe", "-v", "error", "-show_entries", wanted, "-of", "csv=p=0", "leg.mp4"]
     told = subprocess.run(probe, capture_output=True, text=True, check=True).stdout
-    assert told.strip() == "128,96,20/1,24"
+    assert told.strip() == "64,64,10/1,12"
 
 
 def test_a_gif_shows_the_last_whole_period_and_others_all_of_the_run() -> None:
@@ -248,8 +263,8 @@ REFUSED = [
 ]
 
 
-def test_what_cannot_be_drawn_is_one_line(shell: Shell, monkeypatch: pytest.MonkeyPatch) -> None:
-    assert shell("run", "short.toml", "--out", "mine", "--quiet").status == 0
+def test_what_cannot_be_drawn_is_one_line(recorded: Shell, monkeypatch: pytest.MonkeyPatch) -> None:
+    shell = recorded
     Path("mine.gif").mkdir()
     monkeypatch.setattr(gl, "find", lambda: "egl")  # refused before anything is drawn
     for arguments, line in REFUSED:
