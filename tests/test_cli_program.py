@@ -59,17 +59,17 @@ def test_output_suits_its_reader(folder: Path) -> None:
         assert process.returncode == 141
 
 
-@pytest.mark.parametrize("args", [["--help"], ["run", "--help"], ["--version"]])
-def test_help_is_quick(args: list[str]) -> None:
-    code = f"""
+def test_help_is_quick() -> None:
+    code = """
 import sys
 from fivebar_sim.cli import main
-try:
-    main({args})
-except SystemExit as end:
-    assert not end.code
-slow = {{"rerun", "dm_control", "matplotlib", "mujoco", "scipy", "pyarrow"}}
-print("slow:", sorted(slow & set(sys.modules)))
+slow = {"rerun", "dm_control", "matplotlib", "mujoco", "scipy", "pyarrow"}
+for args in (["--version"], ["--help"], ["run", "--help"]):
+    try:
+        main(args)
+    except SystemExit as end:
+        assert not end.code
+    print("slow:", sorted(slow & set(sys.modules)))
 """
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout.endswith("slow: []\n")
+    assert [line for line in done.stdout.splitlines() if "slow:" in line] == 3 * ["slow: []"]

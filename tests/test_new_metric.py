@@ -12,6 +12,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from shell import Said
 
 ROOT = Path(__file__).resolve().parents[1]
 KEY = "tracking.percentile_95"
@@ -28,12 +29,26 @@ ramp = 0.1
 [limits]
 tracking.percentile_95 = {limit}
 """
-Program = Callable[..., subprocess.CompletedProcess[str]]
+Program = Callable[..., list[Said]]
+COMMANDS = """
+import contextlib, io, json, sys
+from fivebar_sim import cli
+from fivebar_sim.report import single
+single.figures = lambda run: []  # what it draws says nothing of the metric
+came = []
+for command in json.loads(sys.argv[1]):
+    out, err = io.StringIO(), io.StringIO()
+    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
+        status = cli.main(command.split())
+    came.append([status, out.getvalue(), err.getvalue()])
+print(json.dumps(came))
+"""
+"""A program that calls several commands, since each would import everything anew."""
 
 
 @pytest.fixture
 def fivebar(tmp_path: Path) -> Program:
-    """Return the command `fivebar` of a copy of the package that has the page's metric."""
+    """Return what calls commands of a copy of the package that has the page's metric."""
     ignored = shutil.ignore_patterns("__pycache__")
     shutil.copytree(ROOT / "fivebar_sim", tmp_path / "fivebar_sim", ignore=ignored)
     for name in ("models", "scenarios", "controllers"):
@@ -47,15 +62,17 @@ def fivebar(tmp_path: Path) -> Program:
     before, begin, after = catalogue.read_text().partition("CATALOGUE = (\n")
     catalogue.write_text(f"{before}{begin}{row},\n{after}")
 
-    def program(*args: str) -> subprocess.CompletedProcess[str]:
-        return subprocess.run(
-            [sys.executable, "-m", "fivebar_sim", *args],
+    def program(*commands: str) -> list[Said]:
+        done = subprocess.run(
+            [sys.executable, "-c", COMMANDS, json.dumps(commands)],
             cwd=tmp_path,
             env={**os.environ, "PYTHONPATH": str(tmp_path), "COLUMNS": "80"},
             capture_output=True,
             text=True,
             check=False,
         )
+        assert done.returncode == 0, done.stderr
+        return [Said(*each) for each in json.loads(done.stdout)]
 
     return program
 
@@ -65,30 +82,30 @@ def test_a_row_and_a_function_are_all(fivebar: Program, tmp_path: Path) -> None:
     scenario = tmp_path / "mine.toml"
     scenario.write_text(SCENARIO.format(limit=0.02))
 
-    ran = fivebar("run", "mine.toml", "--out", "run")
-    assert (ran.returncode, ran.stderr) == (0, "")
-    assert re.search(rf"{LABEL} +[\d.]+ mm +<= 20 mm +pass", ran.stdout)
+    ran, reported, checked = fivebar(
+        "run mine.toml --out run", "report run", "check mine.toml --update --junit junit.xml"
+    )
+    assert (ran.status, ran.err) == (0, "")
+    assert re.search(rf"{LABEL} +[\d.]+ mm +<= 20 mm +pass", ran.out)
 
     metrics = json.loads((tmp_path / "run/metrics.json").read_text())
     tracked = metrics["tracking"]
     assert tracked["rms"] < tracked["percentile_95"] < tracked["max"]
     assert LABEL.encode() in (tmp_path / "run/recording.rrd").read_bytes()
 
-    assert fivebar("report", "run").returncode == 0
+    assert reported.status == 0
     assert LABEL in (tmp_path / "run/report.html").read_text()
 
-    checked = fivebar("check", "mine.toml", "--update", "--junit", "junit.xml")
-    assert checked.returncode == 0
+    assert checked.status == 0
     assert f'name="{KEY}"' in (tmp_path / "junit.xml").read_text()
     baseline = tmp_path / "baselines/mine.json"
     recorded = json.loads(baseline.read_text())["metrics"][KEY]
     assert recorded["value"] == pytest.approx(tracked["percentile_95"], rel=1e-5)
 
     # neither a broken limit nor a better value passes unseen
-    scenario.write_text(SCENARIO.format(limit=1e-6))
-    failed = fivebar("check", "mine.toml")
-    assert failed.returncode == 1
-    assert f"FAIL: mine: {LABEL}: " in failed.stdout
-    scenario.write_text(SCENARIO.format(limit=0.02))
+    (tmp_path / "strict.toml").write_text(SCENARIO.format(limit=1e-6))
     baseline.write_text(baseline.read_text().replace(str(recorded["value"]), "0.5"))
-    assert f"better than its baseline: {LABEL}" in fivebar("check", "mine.toml").stdout
+    failed, better = fivebar("check strict.toml", "check mine.toml")
+    assert failed.status == 1
+    assert f"FAIL: mine: {LABEL}: " in failed.out
+    assert f"better than its baseline: {LABEL}" in better.out
