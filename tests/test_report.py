@@ -203,6 +203,7 @@ def test_command_says_where(
     runs: dict[str, Path], shell: Shell, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(look, "png", lambda figure: b"")  # pictures: test_same_runs_same_bytes
+    monkeypatch.setattr(look, "svg", lambda figure, key, alt: "<svg></svg>")
     run = shutil.copytree(runs["limited"], shell.folder / "mine")
     assert shell("report", "mine") == (0, "report of 1 run in mine/report.html\n", "")
     assert (run / "report.html").stat().st_mode & 0o777 == 0o644
