@@ -10,7 +10,7 @@ import os
 import shutil
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import pytest
 
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from playwright.sync_api import Browser, Page
 
 WIDTHS = (390, 1280)
+SCHEMES: tuple[Literal["light", "dark"], ...] = ("light", "dark")
 
 FIGURES = """() => [...document.querySelectorAll('figure')].map(figure => {
     const box = figure.querySelector('svg').getBoundingClientRect();
@@ -78,12 +79,9 @@ def reports(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     }
 
 
-def opened(
-    browser: Browser, path: Path, width: int, scheme: str = "light"
-) -> tuple[Page, list[str]]:
-    """Return a page, and a list that gathers what it says or asks for."""
-    dark = "dark" if scheme == "dark" else "light"
-    page = browser.new_page(viewport={"width": width, "height": 800}, color_scheme=dark)
+def opened(browser: Browser, path: Path) -> tuple[Page, list[str]]:
+    """Return a page in light colours, and a list that gathers what it says or asks for."""
+    page = browser.new_page(viewport={"width": WIDTHS[0], "height": 800}, color_scheme="light")
     said: list[str] = []
     page.on("console", lambda message: said.append(message.text))
     page.on("pageerror", lambda error: said.append(str(error)))
@@ -93,23 +91,24 @@ def opened(
     return page, said
 
 
-@pytest.mark.parametrize("width", WIDTHS)
 @pytest.mark.parametrize("which", ["one", "two"])
 def test_page_is_alone_drawn_and_fits(
-    browser: Browser, reports: dict[str, Path], which: str, width: int
+    browser: Browser, reports: dict[str, Path], which: str
 ) -> None:
-    page, said = opened(browser, reports[which], width)
+    page, said = opened(browser, reports[which])
+    for width in WIDTHS:
+        page.set_viewport_size({"width": width, "height": 800})
+        assert page.evaluate("document.documentElement.scrollWidth") <= width
+        figures = page.evaluate(FIGURES)
+        assert len(figures) == (7 if which == "one" else 6)
+        for figure in figures:
+            assert 300.0 < figure["width"] <= width
+            assert figure["height"] > 120.0
+            assert figure["lines"] >= 2
+            assert figure["letters"] >= 6
+            assert figure["outside"] == 0
+            assert figure["smallest"] >= 8.0
     assert said == [reports[which].as_uri()]
-    assert page.evaluate("document.documentElement.scrollWidth") <= width
-    figures = page.evaluate(FIGURES)
-    assert len(figures) == (7 if which == "one" else 6)
-    for figure in figures:
-        assert 300.0 < figure["width"] <= width
-        assert figure["height"] > 120.0
-        assert figure["lines"] >= 2
-        assert figure["letters"] >= 6
-        assert figure["outside"] == 0
-        assert figure["smallest"] >= 8.0
     page.close()
 
 
@@ -117,12 +116,13 @@ def test_dark_and_light_and_print(browser: Browser, reports: dict[str, Path]) ->
     """Paper, letters and a line differ between light and dark; paper is printed white."""
     selectors = ("body", "#torque text", "#tracking-error path[style*='--error']")
     looks = {}
-    for scheme in ("light", "dark"):
-        page, _ = opened(browser, reports["one"], 1280, scheme)
+    page, _ = opened(browser, reports["one"])
+    for scheme in SCHEMES:
+        page.emulate_media(media="screen", color_scheme=scheme)
         looks[scheme] = [page.evaluate(SEEN, each) for each in selectors]
-        page.emulate_media(media="print", color_scheme="dark" if scheme == "dark" else "light")
+        page.emulate_media(media="print", color_scheme=scheme)
         assert page.evaluate(SEEN, "body")[2] == "rgb(255, 255, 255)"
-        page.close()
+    page.close()
     for light, dark in zip(looks["light"], looks["dark"], strict=True):
         assert light != dark
     assert looks["dark"][0][2] == "rgb(21, 24, 29)"
