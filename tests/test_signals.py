@@ -50,7 +50,7 @@ sys.exit(status)
 """
 """The program, that says when signals are heard, and when no more."""
 ENDS = [(signal.SIGINT, 130, "fivebar: interrupted\n"), (signal.SIGTERM, 143, "")]
-LONG = ["run", "short.toml", "--quiet", "--set", "duration=1000", "--out", "mine"]
+LONG = ["run", "short.toml", "--quiet", "--set", "duration=300", "--out", "mine"]
 
 
 @pytest.fixture(autouse=True)
