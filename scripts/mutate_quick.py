@@ -28,8 +28,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import NamedTuple
 
-import hypothesis  # noqa: F401  what the tests import, once for all forks
-import mujoco  # noqa: F401
+import hypothesis
+import mujoco  # noqa: F401  what the tests import, once for all forks
 import mutate
 import numpy as np  # noqa: F401
 import pytest
@@ -42,6 +42,15 @@ LEAST = 4
 SECONDS = 120
 """A mutant that runs longer is dead."""
 NONE = "none"
+
+# as tests/conftest.py draws; but that a mutant dies is enough, no smallest example is looked for
+hypothesis.settings.register_profile(
+    "unshrunk",
+    deadline=None,
+    derandomize=True,
+    suppress_health_check=[hypothesis.HealthCheck.too_slow],
+    phases=[hypothesis.Phase.explicit, hypothesis.Phase.generate],
+)
 
 
 class Mutant(NamedTuple):
@@ -120,7 +129,8 @@ def asked(folder: Path, tests: list[str]) -> str:
     failed = _Failed()
     skipped = [f"--deselect={test}" for test in mutate.SLOW]
     options = ["-x", "-p", "no:cacheprovider", "-W", "ignore::pytest.PytestAssertRewriteWarning"]
-    code = pytest.main([*options, *skipped, *tests], plugins=[failed])
+    profile = "--hypothesis-profile=unshrunk"
+    code = pytest.main([*options, profile, *skipped, *tests], plugins=[failed])
     return failed.first or (NONE if code == 0 else f"pytest's exit status {code}")
 
 
