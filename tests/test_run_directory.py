@@ -18,6 +18,7 @@ from fivebar_controllers.pd import Pd
 from fivebar_sim import report, rollout
 from fivebar_sim.errors import RunDirectoryError
 from fivebar_sim.recording import rrd
+from fivebar_sim.report import single
 from fivebar_sim.rollout import Result
 from fivebar_sim.runs import directory
 from fivebar_sim.runs.directory import FILES
@@ -39,6 +40,12 @@ MEASURED = [
 def result() -> Result:
     settings = ["duration=0.751", "path.frequency=4", "limits={tracking={rms=1e-9}}"]
     return rollout.run(Scenario.load("classic-ellipse", settings))
+
+
+@pytest.fixture
+def light(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Write no recording but its first bytes: where the whole directory goes is what is asked."""
+    monkeypatch.setattr(rrd, "write", lambda path, runs: path.write_bytes(b"RRF2"))
 
 
 def names(folder: Path) -> set[str]:
@@ -114,7 +121,10 @@ def test_run_of_a_run_is_the_same_run(tmp_path: Path) -> None:
     assert names(tmp_path) == {"trot"}
 
 
-def test_run_of_another_controller_is_read_again(tmp_path: Path) -> None:
+def test_run_of_another_controller_is_read_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(single, "figures", lambda run: [])  # that the run is read is enough
     loaded = Scenario.load("classic-ellipse", ["duration=0.5", "path.frequency=4", "limits={}"])
     first = rollout.run(loaded.driven_by(Pd(kp=3.0)))
     where = first.write(tmp_path / "steered")
@@ -153,6 +163,7 @@ def test_load_that_nobody_shares_is_null(tmp_path: Path) -> None:
     assert share is None or math.isfinite(share)
 
 
+@pytest.mark.usefixtures("light")
 def test_existing_run_and_empty_directory_are_exchanged(tmp_path: Path, result: Result) -> None:
     where = tmp_path / "mine"
     where.mkdir()
@@ -165,6 +176,7 @@ def test_existing_run_and_empty_directory_are_exchanged(tmp_path: Path, result: 
     assert names(tmp_path) == {"mine"}
 
 
+@pytest.mark.usefixtures("light")
 def test_relative_and_odd_names_are_taken_literally(
     tmp_path: Path, result: Result, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -237,6 +249,7 @@ def test_full_disk_leaves_what_was_there(
     assert not there or names(where) == {*FILES, "notes.txt"}
 
 
+@pytest.mark.usefixtures("light")
 @pytest.mark.parametrize("error", [KeyboardInterrupt, OSError(errno.EIO, "Input/output error")])
 def test_interrupt_between_the_renames_brings_the_old_run_back(
     tmp_path: Path, result: Result, monkeypatch: pytest.MonkeyPatch, error: Any
@@ -257,6 +270,7 @@ def test_interrupt_between_the_renames_brings_the_old_run_back(
     assert names(tmp_path) == {"mine"}
 
 
+@pytest.mark.usefixtures("light")
 @pytest.mark.parametrize("missing", FILES)
 def test_incomplete_run_is_none(tmp_path: Path, result: Result, missing: str) -> None:
     where = result.write(tmp_path / "mine")

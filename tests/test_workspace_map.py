@@ -31,8 +31,7 @@ def test_map_is_cut_to_the_region() -> None:
     np.testing.assert_allclose(surveyed.distance, surveyed.distance[:, ::-1], atol=1e-12)
 
 
-@pytest.mark.parametrize("suffix", [".png", ".svg"])
-@pytest.mark.parametrize("name", ["classic", "doggo"])
+@pytest.mark.parametrize(("name", "suffix"), [("classic", ".png"), ("doggo", ".svg")])
 def test_command_draws(
     name: str, suffix: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
