@@ -6,6 +6,7 @@ import errno
 import http.client
 import os
 import re
+import shutil
 import signal
 import socket
 import subprocess
@@ -13,18 +14,28 @@ import sys
 from pathlib import Path
 
 import pytest
-from shell import Shell, started
+from shell import ELLIPSE, Shell, started
 
+from fivebar_sim import rollout
 from fivebar_sim.runs import recording_file
+from fivebar_sim.scenario import Scenario
 
 PROGRAM = "import sys; from fivebar_sim.cli import main; sys.exit(main())"
 
 
+@pytest.fixture(scope="module")
+def written(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return the run directory of a short run."""
+    folder = tmp_path_factory.mktemp("run")
+    (folder / "short.toml").write_text(ELLIPSE, encoding="utf-8")
+    return rollout.run(Scenario.load(folder / "short.toml")).write(folder / "mine")
+
+
 @pytest.fixture
-def recorded(shell: Shell) -> Shell:
+def recorded(shell: Shell, written: Path) -> Shell:
     """Return a shell in whose folder there are two runs."""
     for name in ("mine", "other"):
-        assert shell("run", "short.toml", "--out", name, "--quiet").status == 0
+        shutil.copytree(written, shell.folder / name)
     return shell
 
 
@@ -89,23 +100,25 @@ def test_port_is_refused_where_it_is_of_no_use(recorded: Shell) -> None:
     assert said == f"--port must be free, got {port}: {os.strerror(errno.EADDRINUSE)}"
 
 
-@pytest.mark.parametrize(("number", "status"), [(signal.SIGINT, 0), (signal.SIGTERM, 143)])
+@pytest.mark.parametrize(
+    ("runs", "number", "status"),
+    [(["mine", "other"], signal.SIGINT, 0), (["mine"], signal.SIGTERM, 143)],
+)
 def test_web_serves_until_it_is_ended_and_leaves_nothing(
-    recorded: Shell, tmp_path: Path, number: signal.Signals, status: int
+    recorded: Shell, tmp_path: Path, runs: list[str], number: signal.Signals, status: int
 ) -> None:
     (tmp_path / "temporary").mkdir()
     before = recorded.names()
     server = started(
-        [sys.executable, "-c", PROGRAM, "replay", "mine", "other", "--web"],
+        [sys.executable, "-c", PROGRAM, "replay", *runs, "--web"],
         text=True,
         env=os.environ | {"TMPDIR": str(tmp_path / "temporary")},
     )
     try:
         assert server.stdout is not None
         line = server.stdout.readline()
-        found = re.fullmatch(
-            r"mine \+ other: http://127\.0\.0\.1:(\d+)/ \(Ctrl-C ends it\)\n", line
-        )
+        title = re.escape(" + ".join(runs))
+        found = re.fullmatch(rf"{title}: http://127\.0\.0\.1:(\d+)/ \(Ctrl-C ends it\)\n", line)
         assert found
         connection = http.client.HTTPConnection("127.0.0.1", int(found[1]), timeout=10)
         connection.request("GET", "/recording.rrd")
