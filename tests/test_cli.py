@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import json
+import re
 from pathlib import Path
 from typing import NoReturn
 
@@ -105,6 +106,15 @@ def test_markup_in_names_is_shown_as_it_is(shell: Shell) -> None:
 
 
 # refusal
+
+
+def test_unknown_option_points_to_the_help_of_its_command(shell: Shell) -> None:
+    for words, known in ((["run", "--outt", "x"], "fivebar run"), (["fly"], "fivebar")):
+        with pytest.raises(SystemExit) as end:
+            shell(*words)
+        assert end.value.code == 2
+        err = shell.capture.readouterr().err
+        assert set(re.findall(r"fivebar ?\w* --help", err)) == {f"{known} --help"}
 
 
 @pytest.mark.parametrize(
