@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import itertools
 import socket
 import subprocess
 import threading
 import time
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -39,7 +41,8 @@ def kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
     monkeypatch.setattr(rr.RecordingStream, "connect_grpc", keep)
     monkeypatch.setattr(steps, "WATCHED", 130)
-    monkeypatch.setattr(steps, "GLANCE", 0.0)
+    ticks = itertools.count(0.0, 0.05)  # [s]: a glance at every fourth period of the loop
+    monkeypatch.setattr(steps, "time", SimpleNamespace(monotonic=ticks.__next__))
     return file
 
 
