@@ -21,7 +21,6 @@ from fivebar_sim import environment, kinematics
 from fivebar_sim.control.servo import Servo
 from fivebar_sim.errors import ArgumentError, ConfigError, UnreachableError
 from fivebar_sim.gym import LegEnv
-from fivebar_sim.render import gl
 from fivebar_sim.tasks import KINDS, Randomise
 
 # isort: split
@@ -232,18 +231,15 @@ def test_dm_control_and_pictures_share_a_process(monkeypatch: pytest.MonkeyPatch
     """dm_control loads OpenGL, once and for all: it must be the one that pictures need."""
     for name in ("DISPLAY", "WAYLAND_DISPLAY", "MUJOCO_GL"):
         monkeypatch.delenv(name, raising=False)
-    try:
-        gl.find()
-    except ConfigError as error:
-        if os.environ.get("FIVEBAR_GL") == "required":
-            raise
-        pytest.skip(str(error))
     code = (
         "from fivebar_sim import environment, gym; environment.load('track', seed=0); "
         "env = gym.LegEnv('track', render_mode='rgb_array'); env.reset(seed=0); "
         "print(env.render().shape)"
     )
     done = subprocess.run([sys.executable, "-W", "error", "-c", code], capture_output=True)
+    required = os.environ.get("FIVEBAR_GL") == "required"
+    if b"ConfigError: cannot draw: neither EGL nor OSMesa" in done.stderr and not required:
+        pytest.skip("nothing can be drawn here")
     assert (done.returncode, done.stdout, done.stderr) == (0, b"(480, 640, 3)\n", b"")
 
 
