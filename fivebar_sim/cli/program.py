@@ -78,10 +78,12 @@ def _call(args: list[str]) -> int:
     # Imported late, so that errors and signals during the import are reported like all others.
     import tyro
 
-    plain.style(allowed=all(arg.isprintable() for arg in args))  # the parser quotes them
+    # The parser colours its messages and quotes the arguments in them.
+    plain.style(allowed=all(arg.isprintable() for arg in args))
     config = (tyro.conf.FlagCreatePairsOff,)
     name = args[0] if args else ""
-    if name in COMMANDS:  # without the parsers of all others, which take three times as long
+    # Without the parsers of all other commands, which take three times as long.
+    if name in COMMANDS:
         return tyro.cli(_command(name), prog=f"fivebar {name}", args=args[1:], config=config)
 
     return tyro.extras.subcommand_cli_from_dict(

@@ -179,7 +179,8 @@ class Chain:
         # The square of four times the area of the triangle BCD (Heron), 0 where it is flat.
         area = ((L2 + L3) ** 2 - d2) * (d2 - (L2 - L3) ** 2)
 
-        if not (area > (2.0 * L2 * L3 * SINGULAR) ** 2).all():
+        regular = area > (2.0 * L2 * L3 * SINGULAR) ** 2
+        if regular is not True and not np.all(regular):
             self._check_regular(theta_A, theta_E)
 
         along = (d2 + (L2 - L3) * (L2 + L3)) / (2.0 * d2)
