@@ -48,6 +48,8 @@ def one_line(err: str) -> str:
 
 FULL = """
 import resource, sys
+# Python keeps what the limit left of a module's bytecode, and no later start could read it.
+sys.dont_write_bytecode = True
 from fivebar_sim import cli
 hard = resource.getrlimit(resource.RLIMIT_FSIZE)[1]
 for most in sys.argv[1:]:
