@@ -67,11 +67,8 @@ def check_place(path: Path) -> None:
             be made there.
     """
     try:
-        ours = path.is_dir() and (is_run(path) or not any(path.iterdir()))
-        taken = not ours and (path.exists() or path.is_symlink())
         # No system renames the folder that a process works in.
-        if path.resolve() == Path.cwd():
-            taken = True
+        taken = _is_taken(path) or path.resolve() == Path.cwd()
     except OSError as error:
         raise RunDirectoryError(f"cannot write {path}: {error.strerror}") from None
 
@@ -80,6 +77,32 @@ def check_place(path: Path) -> None:
             f"cannot write {path}: something that is not a run directory is there"
         )
     whole_file.check_parent(path, RunDirectoryError)
+
+
+def _is_taken(path: Path) -> bool:
+    """Return whether something is at path that is neither a run directory nor empty.
+
+    Another process may exchange what is there during the look, which is then repeated.
+    """
+    for left in reversed(range(ATTEMPTS)):
+        before = _identity(path)
+        try:
+            ours = path.is_dir() and (is_run(path) or not any(path.iterdir()))
+        except FileNotFoundError:
+            continue
+        taken = not ours and before is not None
+        if not taken or not left or _identity(path) == before:
+            return taken
+    return False
+
+
+def _identity(path: Path) -> tuple[int, int] | None:
+    """Return which file or folder is at path; None if nothing is."""
+    try:
+        found = path.lstat()
+    except (FileNotFoundError, NotADirectoryError):
+        return None
+    return found.st_dev, found.st_ino
 
 
 def is_run(path: Path) -> bool:
