@@ -298,3 +298,25 @@ def test_phase_just_below_one_is_in_the_last_bin(bins: int) -> None:
 def test_refusal(message: str, torque: ArrayLike, theta: ArrayLike, more: dict[str, Any]) -> None:
     with pytest.raises(ArgumentError, match=message):
         load.measure(torque, theta, **{"timestep": H, **more})
+
+
+@given(windows(), st.integers(0, 4))
+def test_moving_share_is_the_plain_sum_around_each_row(window: Window, half: int) -> None:
+    torque, _ = window
+    amount = np.abs(torque)
+    if not amount.any():
+        return
+
+    share, loaded = load.moving_share(torque, half)
+    around = [amount[max(k - half, 0) : k + half + 1].sum(axis=0) for k in range(len(torque))]
+
+    # The torques are whole numbers: a window is loaded or exactly 0, and every sum is exact.
+    assert [*loaded] == [part.any() for part in around]
+    assert [*share] == [part[0] / part.sum() for part in around if part.any()]
+
+
+def test_moving_share_leaves_out_what_is_nothing_beside_the_largest() -> None:
+    share, loaded = load.moving_share(np.array([[0.0, 1.0], [1e-12, 0.0], [3.0, 1.0]]), 0)
+
+    assert [*loaded] == [True, False, True]
+    assert [*share] == [0.0, 0.75]
