@@ -9,10 +9,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from fivebar_sim.errors import ArgumentError, DivergedError
+from fivebar_sim.metrics import tracking
 from fivebar_sim.metrics.columns import Record
 from fivebar_sim.metrics.limits import Limit, judge
-from fivebar_sim.metrics.measured import Judged, with_verdict
-from fivebar_sim.metrics.tracking import lost_path
+from fivebar_sim.metrics.measured import Judged, Verdict, with_verdict
 from fivebar_sim.scenario import Scenario
 from fivebar_sim.simulation import feedback, measure
 from fivebar_sim.simulation.plan import Plan, period_steps, plan
@@ -62,9 +62,15 @@ class Result(NamedTuple):
         return self.measured.table
 
     @property
-    def verdict(self) -> str:
-        """Either "pass" or "fail"."""
+    def verdict(self) -> Verdict:
+        """Either "pass", "fail", or "not judged" where guards hold but no limits are set."""
         return self.measured.verdict
+
+    @property
+    def remarks(self) -> list[str]:
+        """Warnings for people, which change no verdict: the foot does not follow its path."""
+        astray = tracking.astray(self.scenario.leg, self.record, self.scenario.window)
+        return [] if astray is None else [astray]
 
     def write(self, path: str | Path) -> Path:
         """Write the run directory; see `run_directory.write`."""
@@ -172,7 +178,7 @@ def _result(planned: Plan, states: States) -> Result:
 
     record = columns(planned, states)
     # A foot that is gone leaves finite numbers behind, and metrics of nothing.
-    lost = lost_path(scenario.leg, record)
+    lost = tracking.lost_path(scenario.leg, record)
     if lost is not None:
         far = f"it was {1e3 * scenario.leg.size:.4g} mm away from it at t = {lost:g} s"
         raise broken(planned, states, DivergedError(far, lost))

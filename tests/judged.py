@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any, Literal, get_args, get_origin
+from typing import Any, get_args, get_origin
 
 import msgspec
 
 from fivebar_sim.metrics.guards import Guard
-from fivebar_sim.metrics.measured import Judged, JudgedRows
+from fivebar_sim.metrics.measured import Judged, JudgedRows, Verdict
 
 PROVENANCE = {
     "mujoco": "3.17.0",
@@ -23,7 +23,7 @@ def judged(
     values: Mapping[str, float | None],
     *,
     guards: Sequence[Guard] = (),
-    verdict: Literal["pass", "fail"] = "pass",
+    verdict: Verdict = "pass",
     provenance: Mapping[str, Any] = PROVENANCE,
 ) -> Judged:
     """Return all of metrics.json.

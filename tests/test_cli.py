@@ -9,8 +9,9 @@ from pathlib import Path
 from typing import NoReturn
 
 import pytest
-from shell import CSV, ELLIPSE, Shell
+from shell import CSV, ELLIPSE, JUDGED, Shell
 
+from fivebar_sim import Result
 from fivebar_sim.recording import rrd
 from fivebar_sim.runs.directory import FILES
 
@@ -73,9 +74,44 @@ def test_failing_limit_exits_1_and_still_writes(shell: Shell) -> None:
     assert "FAIL" in checked.out
 
 
+def test_without_limits_nothing_is_judged_but_guards(shell: Shell) -> None:
+    """A motor a thousandth as stiff lets the foot hang 18.9 mm beside its 40 x 16 mm ellipse."""
+    loose = ["--set", "limits={}", "--set", "servo.kp=0.001"]
+    said = shell("run", "classic-ellipse", *loose, "--out", "mine")
+    assert (said.status, said.err) == (0, "")
+    assert "verdict: not judged (guards hold)" in said.out
+    assert "pass" not in said.out
+    assert (
+        "warning: the foot does not follow its path: its RMS error of 18.86 mm is more than a "
+        "tenth of the path's 40 mm"
+    ) in said.out
+    metrics = json.loads(Path("mine/metrics.json").read_text("utf-8"))
+    assert (metrics["verdict"], metrics["limits"]) == ("not judged", [])
+    assert Result.read("mine").verdict == "not judged"
+    assert shell("report", "mine").status == 0
+    page = Path("mine/report.html").read_text("utf-8")
+    assert ">NOT JUDGED</span>" in page
+    assert "Warning: the foot does not follow its path" in page
+
+    said = shell("run", "classic-ellipse", "--set", "limits={}", "--set", "guards.energy=1e-12")
+    assert said.status == 1
+    assert "verdict: FAIL" in said.out
+    assert "warning:" not in said.out
+
+
+def test_check_refuses_what_it_could_not_judge(shell: Shell) -> None:
+    assert shell("check", "short.toml", "--update", "--quiet").status == 0
+    Path("short.toml").write_text(ELLIPSE, encoding="utf-8")
+    for more in ([], ["--update"], ["--set", "servo.kp=9"]):
+        assert shell.refused("check", "short.toml", *more) == (
+            "short.toml: [limits] must set at least one limit: without any, check has nothing to "
+            "judge"
+        )
+
+
 def test_highest_status_counts(shell: Shell) -> None:
     Path("wild.toml").write_text(
-        ELLIPSE.replace("short", "wild") + "[sim]\nintegrator='implicitfast'\ntimestep=0.02\n",
+        JUDGED.replace("short", "wild") + "[sim]\nintegrator='implicitfast'\ntimestep=0.02\n",
         encoding="utf-8",
     )
     said = shell("run", "wild.toml", "short.toml", "--out", "all")

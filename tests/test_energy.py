@@ -166,7 +166,7 @@ def test_a_torque_ten_percent_off_is_noticed(name: str) -> None:
     """Of every preset, and in a landing: the balance is 1e-3 of the turnover wrong, or more."""
     plan = planned(name, *AIR[name])
     body, result, steps = acted(plan)
-    assert result.verdict == "pass"
+    assert result.verdict == "not judged"
     for column in ("torque_A", "torque_E"):
         off = {**result.record, column: 1.1 * result.record[column]}
         wrong = energy.balance(body, off, steps).imbalance

@@ -69,3 +69,8 @@ def test_verdict_needs_limits_and_guards(guard: Guard, ok: bool, verdict: str) -
     found = judged({}, guards=[guard])
     limit = Limit("tracking.rms", 0.0, 1.0, 0.5 if ok else 2.0, ok)
     assert with_verdict(found, [limit], {}).verdict == verdict
+
+
+@pytest.mark.parametrize(("guard", "verdict"), [(HELD, "not judged"), (TRIPPED, "fail")])
+def test_verdict_without_limits_judges_nothing(guard: Guard, verdict: str) -> None:
+    assert with_verdict(judged({}, guards=[guard]), [], {}).verdict == verdict

@@ -164,7 +164,7 @@ def test_phases_are_those_of_the_steps_begin() -> None:
 @pytest.mark.parametrize("kind", SCENES)
 def test_metrics_are_finite_json(kind: str) -> None:
     measured = done(kind)[1].metrics
-    assert json.loads(json.dumps(measured, allow_nan=False))["verdict"] == "pass"
+    assert json.loads(json.dumps(measured, allow_nan=False))["verdict"] == "not judged"
     assert ("ground" in measured) == (kind in ("rail", "treadmill"))
 
 

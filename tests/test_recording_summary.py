@@ -45,7 +45,7 @@ def test_one_run_has_its_limits_its_metrics_and_its_provenance() -> None:
 def test_several_runs_stand_side_by_side() -> None:
     calm = judged(METRICS | {"ground.slip": 1e-3, "closure.rms": 2e-6})
     lines = summary(["a | b\n", "calm"], [MEASURED, calm], [{}, LIMITS]).splitlines()
-    assert lines[:3] == ["## a \\| b: FAIL", "", "No limits set."]
+    assert lines[:3] == ["## a \\| b: FAIL", "", "No limits set: guards alone can fail the run."]
     assert "## calm: PASS" in lines
     assert "| metric | a \\| b | calm |" in lines
     assert "| loop gap RMS | 0.1 um | 2 um |" in lines

@@ -101,5 +101,5 @@ def test_bound_that_a_run_sits_on_is_seen() -> None:
     value = next(each["value"] for each in measured if each["name"] == "energy")
     edge = Scenario.load("classic-ellipse", [*settings, f"guards.energy={value!r}"])
     results = nudged(rollout.plan(edge), 16)
-    assert outcome(results[0]) == ("pass", [])
+    assert outcome(results[0]) == ("not judged", [])
     assert not unmoved(results)

@@ -282,7 +282,7 @@ def test_leg_whose_rest_pose_is_above_its_hip_stands_where_it_hangs(
         duration=1.5,
     )
     result = rollout.run(squat)
-    assert result.verdict == "pass"
+    assert result.verdict == "not judged"
     assert result.metrics["tracking"]["rms"] < 1e-3
 
 

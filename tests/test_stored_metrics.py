@@ -98,7 +98,10 @@ def _guard(**changes: Any) -> Callable[[Any], object]:
             "load.share_A must be a number <= 1.0, got 1",
         ),
         (lambda m: m.update(tracking=3), "tracking must be a table, got 3"),
-        (lambda m: m.update(verdict="PASS"), "verdict must be 'pass' or 'fail', got 'PASS'"),
+        (
+            lambda m: m.update(verdict="PASS"),
+            "verdict must be one of 'pass', 'fail', 'not judged', got 'PASS'",
+        ),
         (lambda m: m.update(more=1), "unknown key more"),
         (lambda m: m.update(ground={}), "ground.force_max is missing"),
         (

@@ -133,7 +133,7 @@ def test_loop_stays_closed() -> None:
 def test_landing_from_half_a_metre_does_not_flip(preset: str) -> None:
     result = stance.drop(preset, "discrete")
     assert result.metrics["branch"]["flips"] == 0
-    assert result.verdict == "pass"
+    assert result.verdict == "not judged"
 
 
 @pytest.mark.parametrize("up", [-1.0, 1.0])

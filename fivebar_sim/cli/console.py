@@ -14,6 +14,7 @@ from rich.table import Table
 from fivebar_sim.metrics import guards
 from fivebar_sim.metrics.catalogue import DETAILS, HIDDEN_AT_ZERO, SHOWN, shown
 from fivebar_sim.metrics.limits import bounds, look_up
+from fivebar_sim.metrics.measured import NOT_JUDGED
 
 if TYPE_CHECKING:
     from fivebar_sim.regression.comparison import Checked, Row
@@ -23,9 +24,17 @@ WIDEST = 300
 """Widest table in a file or a pipe, in characters; there a table takes what it needs."""
 
 
+WORDS = {
+    "pass": "[green]pass[/green]",
+    "fail": "[red]FAIL[/red]",
+    NOT_JUDGED: "[yellow]not judged (guards hold)[/yellow]",
+}
+"""Verdicts with rich's colour tags."""
+
+
 def verdict(ok: bool) -> str:
     """Return "pass" or "FAIL" with rich's colour tags."""
-    return "[green]pass[/green]" if ok else "[red]FAIL[/red]"
+    return WORDS["pass" if ok else "fail"]
 
 
 def print_result(result: Result, where: str, console: Console) -> None:
@@ -45,9 +54,10 @@ def print_result(result: Result, where: str, console: Console) -> None:
     for said in guards.tripped(result.measured.guards):
         console.print(f"[red]{said}[/red]", soft_wrap=True)
 
-    console.print(
-        f"verdict: {verdict(result.verdict == 'pass')}   written to {escape(where)}", soft_wrap=True
-    )
+    for remark in result.remarks:
+        console.print(f"[yellow]warning: {remark}[/yellow]", soft_wrap=True)
+
+    console.print(f"verdict: {WORDS[result.verdict]}   written to {escape(where)}", soft_wrap=True)
 
 
 def _matters(key: str, result: Result) -> bool:
@@ -71,7 +81,7 @@ def print_check(checked: Sequence[Checked], console: Console) -> None:
         if each.broke:
             table.add_row(" run", *[""] * 4, verdict(False))
         elif not each.rows:
-            table.add_row(" no limits set", *[""] * 4, verdict(True))
+            table.add_row(" no limits set", *[""] * 4, WORDS[NOT_JUDGED])
 
     # A pipe or a file has no width; rich would assume 80 columns and cut long names.
     options = console.options.update(max_width=WIDEST)

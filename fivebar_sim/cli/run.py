@@ -28,7 +28,8 @@ def run(
 ) -> int:
     """Simulate scenarios, check their limits, write their run directories.
 
-    Exit status: 1 if a limit is broken, a guard trips or a run diverges, 2 for wrong input.
+    Exit status: 1 if a limit is broken, a guard trips or a run diverges, 2 for wrong input. A
+    scenario without limits is not judged: its status is 0 if its guards hold.
 
     Args:
         scenarios: Names of shipped scenarios or paths of TOML files; by default all shipped ones.
@@ -98,7 +99,7 @@ def _run(
             status = FAILED
             continue
         metrics[name] = result.metrics
-        status = max(status, 0 if result.verdict == "pass" else FAILED)
+        status = max(status, FAILED if result.verdict == "fail" else 0)
         if not (quiet or as_json):
             console.print_result(result, str(place), out)
 

@@ -20,6 +20,11 @@ from fivebar_sim.metrics.json_types import LARGEST, Count, Table
 from fivebar_sim.metrics.limits import Limit, WrittenLimit
 from fivebar_sim.metrics.sharing import Load
 
+Verdict = Literal["pass", "fail", "not judged"]
+"""Of a run; "not judged": its guards hold, but no limits are set that it could break."""
+
+NOT_JUDGED: Verdict = "not judged"
+
 
 class Measured(Table, frozen=True, kw_only=True, dict=True):
     """What a run measured, before anyone judged it.
@@ -44,7 +49,7 @@ class Measured(Table, frozen=True, kw_only=True, dict=True):
 class Judged(Measured, frozen=True, kw_only=True):
     """All of metrics.json."""
 
-    verdict: Literal["pass", "fail"]
+    verdict: Verdict
     limits: list[WrittenLimit]
     provenance: dict[str, str | int | float | None]
 
@@ -81,7 +86,9 @@ def of(
 def with_verdict(
     measured: Measured, limits: Sequence[Limit], provenance: Mapping[str, str | int | float | None]
 ) -> Judged:
-    """Return what was measured with its verdict: "pass" if all limits and guards hold.
+    """Return what was measured with its verdict.
+
+    It is "fail" if a limit or a guard does not hold; else "pass", or "not judged" without limits.
 
     Args:
         measured: What was measured.
@@ -89,8 +96,10 @@ def with_verdict(
         provenance: What the numbers depend on besides the scenario.
     """
     good = all(limit.ok for limit in limits) and all(guard.ok for guard in measured.guards)
+    # Guards only say that the physics can be trusted, not that the leg did what it should.
+    passed = "pass" if limits else NOT_JUDGED
     judged = {
-        "verdict": "pass" if good else "fail",
+        "verdict": passed if good else "fail",
         "limits": [WrittenLimit.of(limit) for limit in limits],
         "provenance": dict(provenance),
     }

@@ -9,6 +9,9 @@ import numpy as np
 from fivebar_sim.arrays import Array
 from fivebar_sim.geometry import FiveBar
 
+ASTRAY = 0.1
+"""Part of a path's extent above which an RMS error means that the foot does not follow it."""
+
 
 def tracking_error(record: Mapping[str, Array]) -> Array:
     """Return the distance of the foot from its target [m], (N,)."""
@@ -32,6 +35,28 @@ def left_path(leg: FiveBar, record: Mapping[str, Array], by: float) -> float:
     # Near is a tenth of the leg's size.
     near = (tracking_error(record) <= 0.1 * leg.size) & (record["time"] <= by)
     return float(record["time"][np.flatnonzero(near)[-1]]) if near.any() else 0.0
+
+
+def astray(leg: FiveBar, record: Mapping[str, Array], window: slice) -> str | None:
+    """Return a warning that the foot hardly follows its path, or None.
+
+    It does if its RMS error over the window is above a tenth of the path's extent there, the longer
+    side of the box around the targets. A path that stays in one place has no extent.
+
+    Args:
+        leg: The leg.
+        record: The columns of rollout.parquet.
+        window: The rows that tracking is measured over.
+    """
+    extent = max(float(np.ptp(record[f"target_{axis}"][window])) for axis in "xz")
+    error = rms(leg, record, window)
+    # Targets in one place may still differ by rounding.
+    if extent <= 1e-9 * leg.size or error <= ASTRAY * extent:
+        return None
+    return (
+        f"the foot does not follow its path: its RMS error of {1e3 * error:.4g} mm is more than "
+        f"a tenth of the path's {1e3 * extent:.4g} mm"
+    )
 
 
 def rms(leg: FiveBar, record: Mapping[str, Array], window: slice) -> float:

@@ -58,7 +58,7 @@ def _judge_all(
 def _limits(judged: Sequence[Limit]) -> Iterator[str]:
     """Yield a table of limits, each with its value."""
     if not judged:
-        yield "No limits set."
+        yield "No limits set: guards alone can fail the run."
         return
     yield "| limit | allowed | value | verdict |"
     yield "|:--|--:|--:|:--|"

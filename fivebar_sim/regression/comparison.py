@@ -53,13 +53,19 @@ class Checked(NamedTuple):
         name: The scenario's name.
         rows: Its metrics that have a limit or a baseline.
         broke: Why the run itself failed: it diverged, or a guard tripped; "" if it did not.
-        notes: Remarks that are not failures: no baseline, or one of another platform or version.
+        notes: Remarks that are not failures: a foot that does not follow its path, no baseline, or
+            one of another platform or version.
     """
 
     name: str
     rows: list[Row]
     broke: str
     notes: list[str]
+
+    @property
+    def judged(self) -> bool:
+        """Whether anything decided: a limit, a baseline, or a guard that tripped."""
+        return bool(self.rows or self.broke)
 
     @property
     def failures(self) -> list[str]:
@@ -88,7 +94,7 @@ def compare(result: Result, baseline: Baseline | None) -> Checked:
     ]
     broke = _broke(result)
     # Of a run that broke, a missing baseline is the least of its problems.
-    notes = [] if broke else list(_notes(baseline, metrics))
+    notes = [] if broke else [*result.remarks, *_notes(baseline, metrics)]
     return Checked(result.scenario.name, rows, broke, notes)
 
 

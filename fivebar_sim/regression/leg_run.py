@@ -17,6 +17,7 @@ from fivebar_sim.metrics import guards
 from fivebar_sim.metrics.catalogue import LIMIT_KEYS, SHOWN, shown
 from fivebar_sim.metrics.columns import Record
 from fivebar_sim.metrics.limits import Limit, bounds, judge
+from fivebar_sim.metrics.measured import Verdict
 from fivebar_sim.regression import comparison
 from fivebar_sim.rollout import Result
 from fivebar_sim.scenario import Scenario
@@ -57,8 +58,8 @@ class LegRun:
         return self.result.limits
 
     @property
-    def verdict(self) -> str:
-        """Either "pass" or "fail"."""
+    def verdict(self) -> Verdict:
+        """Either "pass", "fail", or "not judged" where guards hold but no limits are set."""
         return self.result.verdict
 
     def assert_limits(self) -> None:

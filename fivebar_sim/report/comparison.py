@@ -12,6 +12,7 @@ from fivebar_sim.files import tables
 from fivebar_sim.metrics import ground
 from fivebar_sim.metrics.catalogue import SHOWN, shown
 from fivebar_sim.metrics.limits import bounds, look_up
+from fivebar_sim.metrics.measured import NOT_JUDGED
 from fivebar_sim.metrics.tracking import tracking_error
 from fivebar_sim.recording.plots import points
 from fivebar_sim.report import draw, html, numbers
@@ -203,6 +204,12 @@ GROUND = (
 )
 
 
+def _verdict(run: StoredRun) -> Cell:
+    """Return the verdict of a run; one that nobody judged is neither good nor bad."""
+    verdict = run.measured.verdict
+    return text(verdict) if verdict == NOT_JUDGED else html.verdict(verdict == "pass")
+
+
 def _tripped(run: StoredRun) -> Cell:
     """Return the names of the guards that tripped."""
     return text(", ".join(each.name for each in run.measured.guards if not each.ok))
@@ -216,7 +223,7 @@ def _metrics(runs: Sequence[StoredRun]) -> str:
         head.append(Cell(f'<span class="swatch" style="background: {tint}"></span>{text(name)}'))
 
     rows: list[list[object]] = [
-        ["verdict", *(html.verdict(run.measured.verdict == "pass") for run in runs)],
+        ["verdict", *(_verdict(run) for run in runs)],
         ["guards that tripped", *(_tripped(run) for run in runs)],
     ]
     limits = [{limit.key: limit for limit in numbers.limits(run)} for run in runs]

@@ -6,6 +6,7 @@ from collections.abc import Iterable, Sequence
 from html import escape
 from importlib.metadata import version
 
+from fivebar_sim.metrics.measured import NOT_JUDGED, Verdict
 from fivebar_sim.report import look
 from fivebar_sim.report.draw import Drawn
 
@@ -24,6 +25,7 @@ p { margin: .5rem 0; overflow-wrap: anywhere; }
   font-weight: 700; }
 .pass { color: var(--gap); }
 .fail { color: var(--error); font-weight: 700; }
+.unjudged { color: var(--muted); }
 .figures { display: grid; gap: 1.5rem;
   grid-template-columns: repeat(auto-fit, minmax(min(100%, 27rem), 1fr)); }
 figure { margin: 0; min-width: 0; break-inside: avoid; }
@@ -135,6 +137,12 @@ def table(caption: str, head: Sequence[object], rows: Iterable[Sequence[object]]
 
 def _class(column: int) -> str:
     return ' class="number"' if column else ""
+
+
+def judgement(verdict: Verdict) -> Cell:
+    """Return the verdict of a run: "PASS", "FAIL" or "NOT JUDGED", with its colour."""
+    kind = "unjudged" if verdict == NOT_JUDGED else verdict
+    return Cell(f'<span class="verdict {kind}">{verdict.upper()}</span>')
 
 
 def verdict(ok: bool, more: str = "") -> Cell:

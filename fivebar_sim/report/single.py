@@ -8,7 +8,7 @@ import msgspec
 import tomli_w
 
 from fivebar_sim.checks import is_finite
-from fivebar_sim.metrics import guards
+from fivebar_sim.metrics import guards, tracking
 from fivebar_sim.metrics.catalogue import SHOWN, shown
 from fivebar_sim.metrics.limits import bounds, look_up
 from fivebar_sim.report import html, in_plane, numbers, over_time
@@ -51,7 +51,6 @@ def _head(run: StoredRun) -> str:
     scenario = run.scenario
     window = scenario.window
     h = scenario.sim.timestep
-    good = run.measured.verdict == "pass"
     about = (
         f"The leg {scenario.leg.name} follows a path of kind {scenario.path.__struct_config__.tag} "
         f"in the scene {scenario.scene.kind}, driven by the controller "
@@ -60,13 +59,15 @@ def _head(run: StoredRun) -> str:
         f"the loop gap over the whole run."
     )
     tripped = [f'<p class="fail">{text(said)}</p>' for said in guards.tripped(run.measured.guards)]
-    word = "pass" if good else "fail"
+    remark = tracking.astray(scenario.leg, run.record, window)
+    warnings = [] if remark is None else [f"<p>{text(f'Warning: {remark}.')}</p>"]
 
     return "\n".join(
         [
             f"<header>\n<h1>{text(scenario.name)}</h1>",
-            f'<p><span class="verdict {word}">{"PASS" if good else "FAIL"}</span></p>',
+            f"<p>{html.judgement(run.measured.verdict)}</p>",
             *tripped,
+            *warnings,
             f"<p>{text(about)}</p>\n</header>",
         ]
     )
@@ -84,9 +85,10 @@ def _limits(run: StoredRun) -> str:
         allowed = f"<= {row.show(guard.high)}"
         value = row.show(guard.value)
         rows.append((f"guard {row.name}", allowed, value, html.verdict(guard.ok)))
-    return html.table(
-        "The run passes if all of these hold.", ("metric", "limit", "value", ""), rows
-    )
+    about = "The run passes if all of these hold."
+    if not run.scenario.limits:
+        about = "No limits are set: the run is not judged, but fails if a guard trips."
+    return html.table(about, ("metric", "limit", "value", ""), rows)
 
 
 def _load(run: StoredRun) -> str:

@@ -5,14 +5,14 @@ from __future__ import annotations
 import json
 import re
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import msgspec
 
 from fivebar_sim.errors import RunDirectoryError
 from fivebar_sim.files import input_file, tables
 from fivebar_sim.metrics import measured
-from fivebar_sim.metrics.measured import Judged
+from fivebar_sim.metrics.measured import Judged, Verdict
 
 
 def read(file: Path, *, grounded: bool) -> Judged:
@@ -63,7 +63,8 @@ def _explain(message: str, metrics: Any) -> str:
     came = f"got {_at(metrics, key)!r:.60}"
     name = key or "the file"
     if text.startswith("Invalid enum value"):
-        return f"{name} must be 'pass' or 'fail', {came}"
+        legal = ", ".join(map(repr, get_args(Verdict)))
+        return f"{name} must be one of {legal}, {came}"
 
     # A table's own check has a message of its own; all others begin with "Expected".
     expected = re.fullmatch(r"Expected `([^`]+)`(.*?)(, got .*)?", text)
