@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, settings
-from shell import CSV, ELLIPSE, Shell
+from shell import CSV, JUDGED, Shell
 
 # An ordinary run draws the same examples every time; ./scripts/test --long asks for "random".
 # Neither judges how long an example takes: that is the machine's load, not the code's fault.
@@ -28,6 +28,6 @@ def shell(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> Shell:
     monkeypatch.chdir(tmp_path)
-    (tmp_path / "short.toml").write_text(ELLIPSE, encoding="utf-8")
+    (tmp_path / "short.toml").write_text(JUDGED, encoding="utf-8")
     (tmp_path / "foot.csv").write_text(CSV, encoding="utf-8")
     return Shell(tmp_path, capsys)

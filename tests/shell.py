@@ -22,6 +22,7 @@ radii = [0.02, 0.008]
 frequency = 4.0
 ramp = 0.1
 """
+JUDGED = ELLIPSE + "[limits]\ntracking.rms = 0.02\n"
 CSV = "time_s,x_mm,z_mm\n0,0,-80\n0.2,10,-75\n0.4,0,-70\n0.6,-10,-75\n"
 
 

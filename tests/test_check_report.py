@@ -49,7 +49,10 @@ def test_junit_has_a_case_for_each_run_and_metric() -> None:
         ("three", "run"),
     ]
     assert set(suites[0].attrib) == {"name", "tests", "failures", "errors", "skipped"}
-    assert (suites[0].get("tests"), suites[0].get("failures")) == ("8", "3")
+    counts = [suites[0].get(name) for name in ("tests", "failures", "skipped")]
+    assert counts == ["8", "3", "1"]
+    skipped = {key: each.get("message") for key, c in cases.items() for each in c.iter("skipped")}
+    assert skipped == {("three", "run"): "not judged (guards hold)"}
     failures = {key: f.get("message") for key, c in cases.items() for f in c.iter("failure")}
     assert failures == {
         ("one", "tracking.rms"): "tracking RMS: worse",
@@ -77,7 +80,7 @@ def test_any_text_is_valid_xml(name: str, why: str, note: str) -> None:
 
 def test_markdown_tells_failures_first_and_every_metric() -> None:
     lines = markdown(CHECKED).splitlines()
-    assert lines[0] == "## fivebar check: 2 of 3 failed"
+    assert lines[0] == "## fivebar check: 2 of 3 failed, 1 not judged"
     assert lines[2:7] == [
         "- **FAIL** one: tracking RMS: worse",
         "- **FAIL** one: why",
@@ -94,9 +97,11 @@ def test_markdown_tells_failures_first_and_every_metric() -> None:
     assert table[-3] == ["one", "load share A", "40 to 60 %", "", "undefined", "", "**FAIL**"]
     assert table[-2:] == [
         ["two", "run", "", "", "", "", "**FAIL**"],
-        ["three", "run", "", "", "", "", "pass"],
+        ["three", "run", "", "", "", "", "not judged (guards hold)"],
     ]
-    assert markdown(CHECKED[2:]).startswith("## fivebar check: all 1 pass\n")
+    assert markdown(CHECKED[:1]).startswith("## fivebar check: 1 of 1 failed\n")
+    assert markdown(CHECKED[2:]).startswith("## fivebar check: 0 of 1 failed, 1 not judged\n")
+    assert markdown([Checked("good", ROWS[1:2], "", [])]).startswith("## fivebar check: all 1 pass")
 
 
 @given(name=ODD)

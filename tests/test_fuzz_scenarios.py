@@ -8,7 +8,7 @@ from pathlib import Path
 import fuzz_inputs as inputs
 import pytest
 from fuzz import Bench, Law
-from shell import ELLIPSE
+from shell import ELLIPSE, JUDGED
 
 from fivebar_sim.files import resources
 from fivebar_sim.runs import recording_file
@@ -49,7 +49,7 @@ def bench(
         "force.csv": FORCE,
         "leg.toml": b"L1 = 0.045\nL2 = 0.06\n",
         "servo.toml": b"kp = 6.0\n",
-        "short.toml": ELLIPSE.encode(),
+        "short.toml": JUDGED.encode(),
         "parts.toml": WITH_PARTS.encode(),
         "cycle.toml": WITH_CSVS.format(periodic="true", duration=1.15).encode(),
         "once.toml": WITH_CSVS.format(periodic="false", duration=0.5).encode(),

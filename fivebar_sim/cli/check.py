@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -32,7 +33,7 @@ def check(
 
     The baseline of FILE.toml is baselines/FILE.json beside it: recorded metrics, and how far each
     may move. A metric that got worse by more fails; one that got better is reported. Without a
-    baseline only the limits and guards decide.
+    baseline only the limits and guards decide; a scenario without limits is refused.
 
     Args:
         scenarios: Names of shipped scenarios or paths of TOML files; by default all shipped ones.
@@ -53,6 +54,7 @@ def check(
     # Everything that can be refused is refused here, before minutes of simulation.
     plans = plans_of(sources, settings)
     _check_names(plans)
+    _check_limits(sources, plans)
     places = [baseline.place(source) for source in sources]
     olds = [baseline.read(place) for place in places]
     _check_places(junit, summary)
@@ -110,6 +112,16 @@ def _check_names(plans: list[Plan]) -> None:
     for name in names:
         if names.count(name) > 1:
             raise ConfigError(f"two scenarios are called {name!r}: give each its own name")
+
+
+def _check_limits(sources: Sequence[str], plans: list[Plan]) -> None:
+    """Raise if a scenario sets no limits: whatever it does would be fine."""
+    for source, planned in zip(sources, plans, strict=True):
+        if not planned.scenario.limits:
+            raise ConfigError(
+                f"{source}: [limits] must set at least one limit: without any, check has nothing "
+                "to judge"
+            )
 
 
 def _results(plans: list[Plan]) -> list[Result | DivergedError]:

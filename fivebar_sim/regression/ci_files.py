@@ -9,7 +9,11 @@ from xml.etree import ElementTree
 
 from fivebar_sim.metrics.catalogue import SHOWN, shown
 from fivebar_sim.metrics.limits import bounds
+from fivebar_sim.metrics.measured import NOT_JUDGED
 from fivebar_sim.regression.comparison import BETTER, FAIL, Checked, Row
+
+UNJUDGED = f"{NOT_JUDGED} (guards hold)"
+"""Verdict of a run without limits and baseline."""
 
 NO_XML = re.compile("[^\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 """Characters that XML 1.0 has no way to write."""
@@ -25,7 +29,9 @@ def junit(checked: Sequence[Checked]) -> str:
     suite = ElementTree.SubElement(suites, "testsuite", name="fivebar check")
     for each in checked:
         broke = [each.broke] if each.broke else []
-        _case(suite, each.name, "run", broke, each.remarks)
+        # Readers of JUnit count what is skipped apart from what passed.
+        skipped = "" if each.judged else UNJUDGED
+        _case(suite, each.name, "run", broke, each.remarks, skipped)
         for row in each.rows:
             whys = [row.why] if row.why else []
             failed = row.verdict == FAIL
@@ -35,7 +41,7 @@ def junit(checked: Sequence[Checked]) -> str:
         "tests": len(suite),
         "failures": len(suite.findall("testcase/failure")),
         "errors": 0,
-        "skipped": 0,
+        "skipped": len(suite.findall("testcase/skipped")),
     }
     for element in (suites, suite):
         element.attrib.update({key: str(count) for key, count in counts.items()})
@@ -46,10 +52,17 @@ def junit(checked: Sequence[Checked]) -> str:
 
 
 def _case(
-    suite: ElementTree.Element, run: str, name: str, whys: Sequence[str], remarks: Sequence[str]
+    suite: ElementTree.Element,
+    run: str,
+    name: str,
+    whys: Sequence[str],
+    remarks: Sequence[str],
+    skipped: str = "",
 ) -> None:
-    """Append a test case, failed if there is a reason, with its remarks as output."""
+    """Append a test case, failed or skipped if there is a reason, with its remarks as output."""
     case = ElementTree.SubElement(suite, "testcase", classname=_xml(run), name=name)
+    if skipped:
+        ElementTree.SubElement(case, "skipped", message=skipped)
     for why in whys:
         ElementTree.SubElement(case, "failure", message=_xml(why), type="check").text = _xml(why)
     if remarks:
@@ -63,7 +76,10 @@ def _xml(text: str) -> str:
 def markdown(checked: Sequence[Checked]) -> str:
     """Return a summary in Markdown: failures and remarks, then every metric, folded away."""
     failed = sum(bool(each.failures) for each in checked)
+    unjudged = sum(not each.judged for each in checked)
     verdict = f"{failed} of {len(checked)} failed" if failed else f"all {len(checked)} pass"
+    if unjudged:
+        verdict = f"{failed} of {len(checked)} failed, {unjudged} not judged"
     lines = [f"## fivebar check: {verdict}", ""]
     for each in checked:
         failures = [("FAIL", line) for line in each.failures]
@@ -82,7 +98,7 @@ def _table(checked: Sequence[Checked]) -> Iterator[str]:
     for each in checked:
         # Without a row of its own, a run that broke would be missing from the table.
         if each.broke or not each.rows:
-            verdict = f"**{FAIL}**" if each.broke else "pass"
+            verdict = f"**{FAIL}**" if each.broke else UNJUDGED
             yield f"| {_md(each.name)} | run | | | | | {verdict} |"
         for row in each.rows:
             yield f"| {' | '.join([_md(each.name), *_cells(row)])} |"
