@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import mujoco
 import numpy as np
 import pytest
 from shell import Shell
@@ -13,6 +14,7 @@ from fivebar_sim import rollout
 from fivebar_sim.arrays import Array
 from fivebar_sim.errors import ArgumentError, ConfigError
 from fivebar_sim.geometry import FiveBar
+from fivebar_sim.kinematics.stops import angle_at_C
 from fivebar_sim.metrics import guards, lasting
 from fivebar_sim.metrics.guards import Guard, Guards
 from fivebar_sim.rollout import Plan, Result
@@ -126,6 +128,45 @@ def test_solver_that_ran_out_of_iterations() -> None:
     assert str(guard).startswith(f"guard solver: {words}")
 
 
+@pytest.mark.parametrize(
+    ("joint", "limits"), [("A", (-6.0, -2.1)), ("B", (-3.0, 1.45)), ("E", (-1.05, 6.0))]
+)
+def test_stop_that_acts_is_named_with_the_step_that_mujoco_pushes_in(
+    joint: str, limits: tuple[float, float]
+) -> None:
+    """A joint whose range ends within the path, as someone may have set it in the model."""
+    plan = rollout.plan(Scenario.load("classic-ellipse", ["limits={}", "duration=0.8"]))
+    plan.model.joint(joint).range = limits
+    result = rollout.execute(plan)
+    guard = tripped(result)["stops"]
+    assert (result.verdict, guard.part) == ("fail", f"joint {joint}")
+    assert f"guard stops: joint {joint} leaned into its stop by more than " in str(guard)
+    assert guard.value is not None
+    assert guard.value > 0.01
+
+    data = mujoco.MjData(plan.model)
+    data.qpos[:] = plan.start
+    for ctrl in plan.ctrl:
+        data.ctrl[:] = ctrl
+        mujoco.mj_step(plan.model, data)
+        pushed = data.efc_force[data.efc_type == mujoco.mjtConstraint.mjCNSTR_LIMIT_JOINT]
+        if pushed.any():
+            break
+    # The pose at the end of a step pushes in the next one.
+    assert guard.time == pytest.approx(data.time - 0.001, abs=0.0015)
+
+
+def test_stop_at_C_is_named_too() -> None:
+    plan = rollout.plan(Scenario.load("classic-ellipse", ["limits={}", "duration=0.8"]))
+    middle = float(angle_at_C(plan.motion.q).mean())
+    plan.model.tendon_range[plan.model.tendon("C_angle").id] = (0.0, middle)
+    assert tripped(rollout.execute(plan))["stops"].part == "joint C"
+    scenario = plan.scenario
+    held = rollout.run(scenario).measured.guards
+    (stops,) = (guard for guard in held if guard.name == "stops")
+    assert (stops.value, stops.time, stops.part, stops.ok) == (0.0, None, None, True)
+
+
 def test_clipped_time_is_of_the_worse_motor_within_a_second() -> None:
     """3 s at 10 ms: A is clipped every other step for a second, E for 0.3 s in one piece."""
     time = np.arange(1.0, 301.0) * 0.01
@@ -165,7 +206,8 @@ def test_bounds_are_in_parts_of_the_leg() -> None:
     (loop,) = (each for each in long if each["name"] == "loop")
     assert loop["high"] == pytest.approx(0.02 * FiveBar.load("classic").size)
     assert {each["name"] for each in long} == {
-        *("branch", "loop", "torque", "chatter", "energy", "constraints", "step", "solver")
+        *("branch", "loop", "torque", "chatter", "energy", "constraints", "step"),
+        *("solver", "stops"),
     }
 
 

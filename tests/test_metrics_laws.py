@@ -65,6 +65,7 @@ def besides(record: dict[str, Array], saturated: Bools | None = None) -> measure
         saturated=np.zeros((ROWS, 2), dtype=bool) if saturated is None else saturated,
         unsolved=np.arange(ROWS) == 700,
         warnings=3,
+        ranges={"A": (-6.0, 6.0)},
     )
 
 
@@ -178,6 +179,7 @@ def test_energy_and_guards_are_those_of_the_whole_run(rng: np.random.Generator, 
         works,
         more.unsolved,
         command=1,
+        ranges=more.ranges,
     )
     judged = guards.judge(checked)
     assert msgspec.to_builtins(judged) == found["guards"]

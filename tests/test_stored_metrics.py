@@ -64,7 +64,12 @@ def test_everything_is_needed_and_nothing_else_is_known(kept: list[Kept], tmp_pa
             for value in (None, {"x": 1}, [[]], True, "\x1b[31m", -1e300, float("nan")):
                 if said_of or (key == "provenance" and value == {"x": 1}):
                     continue  # provenance may say anything
-                if (key, value) in (("ok", True), ("stance", None), ("phase", None)):
+                if (key, value) in (
+                    ("ok", True),
+                    ("stance", None),
+                    ("phase", None),
+                    ("part", None),
+                ):
                     continue  # so it may be
                 if value is None and not table:
                     continue  # undefined in this bin

@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from fivebar_sim.arrays import Array, Bools
 from fivebar_sim.geometry import FiveBar
 from fivebar_sim.kinematics.reach import foot_radius_and_angle
+
+Ranges = Mapping[str, tuple[float, float]]
+"""The ranges of joints' angles [rad], by joint; that of C is of `angle_at_C`."""
 
 C_STOP = float(np.radians(2.0))
 """Distance of the stops of the angle at C from 0 and from 180 deg [rad]."""
@@ -52,6 +57,22 @@ def stops_at_C(rest: Array) -> tuple[float, float]:
     # Between two multiples of pi there is one assembly mode; the rest pose tells which two.
     straight = float(np.floor(angle_at_C(rest) / np.pi) * np.pi)
     return straight + C_STOP, straight + np.pi - C_STOP
+
+
+def beyond(q: Array, ranges: Ranges) -> dict[str, Array]:
+    """Return how far each joint is beyond its range [rad], by joint, each (N,); 0 within it.
+
+    A stop is a soft constraint: it can push only while the angle is beyond the range.
+
+    Args:
+        q: (theta_A, theta_B, theta_E, theta_D) [rad], (N, 4).
+        ranges: The joints' ranges; a joint that is left out has no stop.
+    """
+    angles = {"A": q[:, 0], "B": q[:, 1], "E": q[:, 2], "D": q[:, 3], "C": angle_at_C(q)}
+    return {
+        joint: np.maximum(np.maximum(low - angles[joint], angles[joint] - high), 0.0)
+        for joint, (low, high) in ranges.items()
+    }
 
 
 def in_turn(leg: FiveBar, rest: Array, q: Array, begun: Array) -> Array:

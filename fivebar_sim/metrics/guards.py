@@ -19,11 +19,16 @@ from fivebar_sim.arrays import Array, Bools
 from fivebar_sim.checks import check_number
 from fivebar_sim.errors import unknown
 from fivebar_sim.geometry import FiveBar
+from fivebar_sim.kinematics.stops import Ranges, beyond
 from fivebar_sim.metrics import ground
 from fivebar_sim.metrics.branch import Branch
+from fivebar_sim.metrics.columns import JOINT_COLUMNS
 from fivebar_sim.metrics.energy import Balance
 from fivebar_sim.metrics.json_types import LARGEST, Amount, Number, Table
 from fivebar_sim.metrics.lasting import chattering, clipped
+
+DEGREES = float(np.degrees(1.0))
+"""Of a radian."""
 
 
 class Guards(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -40,6 +45,7 @@ class Guards(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
         constraints: Largest energy that loop, gear friction and ends of travel may give, as the
             same part.
         step: Largest energy that MuJoCo's steps may give or take by themselves, as the same part.
+        stops: Largest angle by which a joint may lean into a stop [rad]; above 0 the stop pushes.
     """
 
     loop: float = 0.01
@@ -49,13 +55,14 @@ class Guards(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     energy: float = 1e-3
     constraints: float = 0.01
     step: float = 0.02
+    stops: float = 1e-5
 
     def __post_init__(self) -> None:
         check_number("loop", self.loop, "", low=0.0)
         check_number("ground", self.ground, "", low=0.0)
         check_number("torque", self.torque, "", low=0.0, high=1.0)
         check_number("chatter", self.chatter, "", low=0.0, high=1.0)
-        for part in ("energy", "constraints", "step"):
+        for part in ("energy", "constraints", "step", "stops"):
             check_number(part, getattr(self, part), "", low=0.0)
 
 
@@ -68,6 +75,7 @@ class Guard(Table, frozen=True):
         high: Largest value that is fine.
         time: When it tripped, the first step above `high` [s]; None if it never did.
         ok: Whether it held.
+        part: Which part of the leg tripped it, "joint B", where it watches several by name.
     """
 
     name: str
@@ -75,6 +83,7 @@ class Guard(Table, frozen=True):
     high: Annotated[float, msgspec.Meta(ge=0, le=LARGEST)]
     time: Amount
     ok: bool
+    part: Annotated[str, msgspec.Meta(pattern="^[A-Za-z0-9 ]+$")] | None = None
 
     def __post_init__(self) -> None:
         if self.name not in ROWS:
@@ -85,7 +94,7 @@ class Guard(Table, frozen=True):
     def __str__(self) -> str:
         """Return the message of a guard that tripped: the bound, when, and the worst value."""
         row = ROWS[self.name]
-        bound = row.what.format(row.scale * self.high)
+        bound = row.what.format(row.scale * self.high, part=self.part)
         worst = row.worst.format(row.scale * (self.value or 0.0))
         return f"guard {self.name}: {bound} at t = {self.time:g} s{worst}"
 
@@ -102,6 +111,7 @@ class Evidence(NamedTuple):
         balance: Works and energies of each step.
         unsolved: Whether the constraint solver ran out of iterations in each step, (N,).
         command: Steps from one command of the motors to the next.
+        ranges: The ranges of the joints, see `stops.beyond`.
     """
 
     bounds: Guards
@@ -112,14 +122,16 @@ class Evidence(NamedTuple):
     balance: Balance
     unsolved: Bools
     command: int
+    ranges: Ranges
 
 
 class Found(NamedTuple):
-    """The worst value and the bound, both SI, and when the guard tripped [s]."""
+    """The worst value and the bound, both SI, when the guard tripped [s], and which part did."""
 
     value: float | None
     high: float
     time: float | None
+    part: str | None = None
 
 
 class Row(NamedTuple):
@@ -128,7 +140,7 @@ class Row(NamedTuple):
     Attributes:
         name: Name of the guard, and of its bound in a scenario, if it has one.
         function: Finds the worst value; returns None for runs that the guard does not apply to.
-        what: First part of its message, with the bound.
+        what: First part of its message, with the bound and, as {part}, the part that tripped it.
         worst: Last part of its message, with the worst value.
         scale: Factor from SI to the shown unit.
         unit: The shown unit.
@@ -195,6 +207,13 @@ def _unsolved(run: Evidence) -> Found:
     return Found(float(run.unsolved.sum()), 0.0, _first(run.unsolved, run.record["time"]))
 
 
+def _leaned(run: Evidence) -> Found:
+    # Nobody planned the force of a stop: the motion is not the one that was asked for.
+    q = np.stack([run.record[name] for name in JOINT_COLUMNS], axis=-1)
+    found = beyond(q, run.ranges)
+    return _first_of(run, {f"joint {joint}": found[joint] for joint in found}, run.bounds.stops)
+
+
 def _in_floor(run: Evidence) -> Found | None:
     if "ground_z" not in run.record:
         return None
@@ -205,6 +224,17 @@ def _in_floor(run: Evidence) -> Found | None:
 
 def _highest(run: Evidence, values: Array, high: float) -> Found:
     return Found(float(values.max()), high, _first(values > high, run.record["time"]))
+
+
+def _first_of(run: Evidence, parts: Mapping[str, Array], high: float) -> Found:
+    """Return the worst value of all parts, and which of them was the first above the bound."""
+    found = {part: _highest(run, values, high) for part, values in parts.items()}
+    worst = max((each.value or 0.0 for each in found.values()), default=0.0)
+    times = {part: each.time for part, each in found.items() if each.time is not None}
+    if not times:
+        return Found(worst, high, None)
+    first = min(times, key=lambda part: times[part])
+    return Found(worst, high, times[first], first)
 
 
 def _first(chosen: Bools, time: Array) -> float | None:
@@ -277,6 +307,14 @@ GUARDS = (
         ", nor in {:.0f} steps in all",
         1.0,
         "steps",
+    ),
+    Row(
+        "stops",
+        _leaned,
+        "{part} leaned into its stop by more than {:.3g} deg",
+        ", by {:.3g} deg at worst",
+        DEGREES,
+        "deg",
     ),
     Row(
         "ground",

@@ -9,6 +9,7 @@ import msgspec
 import numpy as np
 
 from fivebar_sim.arrays import Array, Bools
+from fivebar_sim.kinematics.stops import Ranges
 from fivebar_sim.metrics import branch, catalogue, energy, ground, guards, load, measured
 from fivebar_sim.metrics.columns import MOTORS, motors
 from fivebar_sim.metrics.json_types import Parts
@@ -28,12 +29,14 @@ class Unrecorded(NamedTuple):
         saturated: Whether the torque limit clipped A and E in each step, (N, 2).
         unsolved: Whether MuJoCo's solver ran out of iterations in each step, (N,).
         warnings: Number of MuJoCo's warnings.
+        ranges: The ranges of the model's joints, see `stops.beyond`.
     """
 
     steps: energy.Steps
     saturated: Bools
     unsolved: Bools
     warnings: int
+    ranges: Ranges
 
 
 def measure(scenario: Scenario, record: Mapping[str, Array], besides: Unrecorded) -> Measured:
@@ -65,6 +68,7 @@ def measure(scenario: Scenario, record: Mapping[str, Array], besides: Unrecorded
         balance=balance,
         unsolved=besides.unsolved,
         command=scenario.command,
+        ranges=besides.ranges,
     )
 
     window = scenario.window

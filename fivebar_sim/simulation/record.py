@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import mujoco
 import numpy as np
 
 from fivebar_sim import kinematics
@@ -9,12 +10,14 @@ from fivebar_sim.arrays import Array, Bools
 from fivebar_sim.control.servo import Drive, applied_torque
 from fivebar_sim.control.servo import saturated as clipped
 from fivebar_sim.errors import DivergedError
+from fivebar_sim.kinematics.stops import Ranges
 from fivebar_sim.metrics import energy
 from fivebar_sim.metrics.columns import (
     BELT_COLUMN,
     COLUMNS,
     GROUND_COLUMNS,
     HIP_COLUMNS,
+    JOINTS,
     MOTOR_JOINTS,
     Record,
 )
@@ -95,7 +98,18 @@ def unrecorded(planned: Plan, states: States) -> Unrecorded:
         saturated=saturated(planned, states),
         unsolved=states.iterations[0] >= limit,
         warnings=int(states.warnings[0]),
+        ranges=_ranges(planned.model),
     )
+
+
+def _ranges(built: mujoco.MjModel) -> Ranges:
+    """Return the ranges of the hinges that have stops, and that of the angle at C."""
+    ids = {joint: built.joint(joint).id for joint in JOINTS}
+    limited = {joint: built.jnt_range[i] for joint, i in ids.items() if built.jnt_limited[i]}
+    tendon = built.tendon("C_angle").id
+    if built.tendon_limited[tendon]:
+        limited["C"] = built.tendon_range[tendon]
+    return {joint: (float(low), float(high)) for joint, (low, high) in limited.items()}
 
 
 def saturated(planned: Plan, states: States) -> Bools:
