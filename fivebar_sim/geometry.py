@@ -70,7 +70,7 @@ class FiveBar:
         mass: Masses of L1..L4 [kg], or None for capsules.
         com: Centres of mass along L1..L4 [m], only with `mass`.
         inertia: Inertias of L1..L4 about their centres [kg m^2], only with `mass`.
-        radius: Radius of the capsules [m]; with `mass` it only matters for pictures.
+        radius: Radius of the capsules [m]; with `mass` only pictures and the guard `floor` need it.
         density: Density of capsules and foot [kg/m^3].
         foot_radius: Radius of the ball at F [m].
         armature: Rotor inertia of each motor, reflected to A and E [kg m^2].

@@ -111,6 +111,56 @@ def test_time_is_that_of_the_first_step_past_the_bound() -> None:
     assert guard.time == record["time"][np.flatnonzero(depth > 2.0 * leg.foot_radius)[0]]
 
 
+FOLDED = (
+    *("duration=0.5", "scene=rail", "leg.L1=0.06", "leg.L3=0.06", "leg.L4=0.06"),
+    *("path.centre=[0,-0.03]", "path.radii=[0.001,0.001]", "path.frequency=4", "path.ramp=0.1"),
+)
+"""A leg with one knee below its foot, in the working modes (-1, -1) and (1, 1)."""
+
+WEAK = ("servo.kp=0.01", "scene.mass=5", "duration=1")
+
+
+@pytest.mark.parametrize(
+    ("name", "settings", "part"),
+    [
+        ("classic-ellipse", (*FOLDED, "leg.mode=[-1,-1]"), "joint B"),
+        ("classic-ellipse", (*FOLDED, "leg.mode=[1,1]"), "joint D"),
+        ("rail-landing", WEAK, "trunk"),
+        ("rail-landing", (*WEAK, "leg.tilt=0.2"), "trunk"),
+    ],
+)
+def test_what_is_in_the_floor_besides_the_foot_is_named(
+    name: str, settings: tuple[str, ...], part: str
+) -> None:
+    """As deep as MuJoCo's own shapes are."""
+    plan = rollout.plan(Scenario.load(name, ["limits={}", *settings]))
+    result = rollout.execute(plan)
+    guard = tripped(result)["floor"]
+    assert (result.verdict, guard.part) == ("fail", part)
+    assert f"guard floor: the {part} was in the floor by more than " in str(guard)
+    assert guard.value == pytest.approx(deepest(plan, result), rel=1e-9)
+
+
+def deepest(plan: Plan, result: Result) -> float:
+    """Return how deep MuJoCo's links and boxes get in the floor [m]."""
+    model = plan.model
+    data = mujoco.MjData(model)
+    # L2 and L3 reach from the same knees to the foot, which may be in the floor.
+    geoms = [model.geom(name) for name in ("L1", "L4", "L5", "trunk")]
+    columns = [result.record[name] for name in ("hip_z", *(f"theta_{j}" for j in "ABED"))]
+    lowest = 0.0
+    for qpos in zip(*columns, strict=True):
+        data.qpos[:] = qpos
+        mujoco.mj_kinematics(model, data)
+        for geom in geoms:
+            x, y, z = np.abs(data.geom_xmat[geom.id][6:])
+            a, b, c = geom.size
+            capsule = geom.type == mujoco.mjtGeom.mjGEOM_CAPSULE
+            reach = a + b * z if capsule else a * x + b * y + c * z
+            lowest = min(lowest, float(data.geom_xpos[geom.id][2]) - reach)
+    return -lowest
+
+
 def hurried() -> Plan:
     """Return a landing of which the solver has too few iterations."""
     plan = rollout.plan(Scenario.load("rail-landing", ["limits={}", "duration=1.2"]))

@@ -66,6 +66,7 @@ def besides(record: dict[str, Array], saturated: Bools | None = None) -> measure
         unsolved=np.arange(ROWS) == 700,
         warnings=3,
         ranges={"A": (-6.0, 6.0)},
+        trunk=-0.006,
     )
 
 
@@ -180,6 +181,7 @@ def test_energy_and_guards_are_those_of_the_whole_run(rng: np.random.Generator, 
         more.unsolved,
         command=1,
         ranges=more.ranges,
+        trunk=more.trunk,
     )
     judged = guards.judge(checked)
     assert msgspec.to_builtins(judged) == found["guards"]

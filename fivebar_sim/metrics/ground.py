@@ -6,8 +6,10 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from fivebar_sim import kinematics
 from fivebar_sim.arrays import Array, Bools
 from fivebar_sim.geometry import FiveBar
+from fivebar_sim.metrics.columns import JOINT_COLUMNS
 from fivebar_sim.metrics.json_types import Amount, Number, Part, Table
 
 
@@ -36,6 +38,28 @@ def stands(record: Mapping[str, Array]) -> Bools:
 def height(leg: FiveBar, record: Mapping[str, Array]) -> Array:
     """Return the height of the foot's ball above the floor [m], (N,); below 0 in the floor."""
     return record["hip_z"] + record["foot_z"] - leg.foot_radius
+
+
+def depths(leg: FiveBar, record: Mapping[str, Array], trunk: float) -> dict[str, Array]:
+    """Return how deep what does not collide is in the floor [m], by part, each (N,); 0 above it.
+
+    The lowest point of a link is on the ball that its capsule ends with, so the joints stand for
+    the links. The foot is left out, and C with it where the foot's ball contains C's.
+
+    Args:
+        leg: The leg.
+        record: The columns of rollout.parquet.
+        trunk: Height of the trunk's lowest point above the hip frame's origin [m].
+    """
+    q = np.stack([record[name] for name in JOINT_COLUMNS], axis=-1)
+    points = kinematics.chain_points(leg, q)
+    A, E = kinematics.bases(leg)
+    heights = {"A": A[1], "B": points.B[:, 1], "D": points.D[:, 1], "E": E[1]}
+    if leg.L6 > max(leg.foot_radius - leg.radius, 0.0):
+        heights["C"] = np.minimum(points.C_left[:, 1], points.C_right[:, 1])
+
+    lowest = {f"joint {joint}": z - leg.radius for joint, z in heights.items()} | {"trunk": trunk}
+    return {part: np.maximum(-(record["hip_z"] + z), 0.0) for part, z in lowest.items()}
 
 
 def contact_radius(leg: FiveBar, height: Array) -> Array:

@@ -45,6 +45,7 @@ class Guards(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
         constraints: Largest energy that loop, gear friction and ends of travel may give, as the
             same part.
         step: Largest energy that MuJoCo's steps may give or take by themselves, as the same part.
+        floor: Largest depth of a joint or the trunk in the floor, as a part of the leg's size.
         stops: Largest angle by which a joint may lean into a stop [rad]; above 0 the stop pushes.
     """
 
@@ -55,6 +56,7 @@ class Guards(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     energy: float = 1e-3
     constraints: float = 0.01
     step: float = 0.02
+    floor: float = 0.01
     stops: float = 1e-5
 
     def __post_init__(self) -> None:
@@ -62,7 +64,7 @@ class Guards(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
         check_number("ground", self.ground, "", low=0.0)
         check_number("torque", self.torque, "", low=0.0, high=1.0)
         check_number("chatter", self.chatter, "", low=0.0, high=1.0)
-        for part in ("energy", "constraints", "step", "stops"):
+        for part in ("energy", "constraints", "step", "floor", "stops"):
             check_number(part, getattr(self, part), "", low=0.0)
 
 
@@ -112,6 +114,7 @@ class Evidence(NamedTuple):
         unsolved: Whether the constraint solver ran out of iterations in each step, (N,).
         command: Steps from one command of the motors to the next.
         ranges: The ranges of the joints, see `stops.beyond`.
+        trunk: Height of the trunk's lowest point above the hip frame's origin [m].
     """
 
     bounds: Guards
@@ -123,6 +126,7 @@ class Evidence(NamedTuple):
     unsolved: Bools
     command: int
     ranges: Ranges
+    trunk: float
 
 
 class Found(NamedTuple):
@@ -220,6 +224,14 @@ def _in_floor(run: Evidence) -> Found | None:
     # Deeper than its own ball, the foot has gone through the floor.
     depth = np.maximum(-ground.height(run.leg, run.record), 0.0)
     return _highest(run, depth, run.bounds.ground * 2.0 * run.leg.foot_radius)
+
+
+def _through_floor(run: Evidence) -> Found | None:
+    if "ground_z" not in run.record:
+        return None
+    # Only the foot collides: anything else would go through the floor without a force.
+    found = ground.depths(run.leg, run.record, run.trunk)
+    return _first_of(run, found, run.bounds.floor * run.leg.size)
 
 
 def _highest(run: Evidence, values: Array, high: float) -> Found:
@@ -320,6 +332,14 @@ GUARDS = (
         "ground",
         _in_floor,
         "the foot was in the floor by more than {:.3g} mm",
+        ", by {:.3g} mm at worst",
+        1e3,
+        "mm",
+    ),
+    Row(
+        "floor",
+        _through_floor,
+        "the {part} was in the floor by more than {:.3g} mm",
         ", by {:.3g} mm at worst",
         1e3,
         "mm",

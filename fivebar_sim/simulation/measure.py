@@ -30,6 +30,7 @@ class Unrecorded(NamedTuple):
         unsolved: Whether MuJoCo's solver ran out of iterations in each step, (N,).
         warnings: Number of MuJoCo's warnings.
         ranges: The ranges of the model's joints, see `stops.beyond`.
+        trunk: Height of the trunk's lowest point above the hip frame's origin [m].
     """
 
     steps: energy.Steps
@@ -37,6 +38,7 @@ class Unrecorded(NamedTuple):
     unsolved: Bools
     warnings: int
     ranges: Ranges
+    trunk: float
 
 
 def measure(scenario: Scenario, record: Mapping[str, Array], besides: Unrecorded) -> Measured:
@@ -69,6 +71,7 @@ def measure(scenario: Scenario, record: Mapping[str, Array], besides: Unrecorded
         unsolved=besides.unsolved,
         command=scenario.command,
         ranges=besides.ranges,
+        trunk=besides.trunk,
     )
 
     window = scenario.window

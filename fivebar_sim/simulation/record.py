@@ -99,7 +99,22 @@ def unrecorded(planned: Plan, states: States) -> Unrecorded:
         unsolved=states.iterations[0] >= limit,
         warnings=int(states.warnings[0]),
         ranges=_ranges(planned.model),
+        trunk=_lowest(planned.model),
     )
+
+
+def _lowest(built: mujoco.MjModel) -> float:
+    """Return the height of the lowest point of hip and trunk above the hip frame's origin [m]."""
+    # The trunk of a rail has its origin in the hip's; both carry boxes alone.
+    bodies = [i for i in range(built.nbody) if built.body(i).name in ("hip", "trunk")]
+    geoms = np.flatnonzero(np.isin(built.geom_bodyid, bodies))
+    turned = np.empty(9)
+    below = []
+    for i in geoms:
+        mujoco.mju_quat2Mat(turned, built.geom_quat[i])
+        reach = float(np.abs(turned[6:]) @ built.geom_size[i])
+        below.append(float(built.geom_pos[i, 2]) - reach)
+    return min(below)
 
 
 def _ranges(built: mujoco.MjModel) -> Ranges:
