@@ -10,6 +10,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from msgspec.structs import replace
 from reports import Page
 from shell import Shell
 
@@ -26,7 +27,7 @@ from fivebar_sim.scenario import Scenario
 AIR = ["foot-path", "leg-moments", "tracking-error", "load-share", "torque", "loop-gap"]
 GROUNDED = [*AIR[:-1], "ground", "loop-gap"]
 OVERLAID = ["foot-path", "torque", "tracking-error", "loop-gap", "load-share", "ground"]
-APART = ("verdict", "limits", "provenance")
+APART = ("verdict", "limits", "guards", "provenance")
 MISSING = object()
 EVIL = "<script>alert('1')</script> &amp; $x$"
 
@@ -99,10 +100,35 @@ def test_every_limit_is_there_with_value_and_verdict(
             seen.add(word)
             row = [SHOWN[limit.key][0], bounds(limit), shown(limit.key, limit.value), word]
             assert row in rows
-        for guard in ("branch", "loop", "torque", "energy", "solver"):
-            assert any(row[0] == f"guard {guard}" for row in rows)
-        assert ["guard branch", "<= 0 flips", "0 flips", "pass"] in rows
     assert seen == {"pass", "FAIL"}
+
+
+@pytest.mark.parametrize("lost", [[], ["torque"]])
+def test_guards_are_folded_to_a_line_and_open_if_one_trips(
+    runs: dict[str, Path], tmp_path: Path, lost: list[str]
+) -> None:
+    """Each has a sentence with its bound, and its worst value with a unit."""
+    run = stored.read(runs["trot"])
+    guards = [
+        replace(guard, ok=guard.name not in lost, time=0.3 if guard.name in lost else None)
+        for guard in run.measured.guards
+    ]
+    run = run._replace(measured=replace(run.measured, guards=guards))
+    with look.project_style():
+        (tmp_path / "page.html").write_text(single.page(run, []), encoding="utf-8")
+    page = Page(tmp_path / "page.html")
+
+    said = f"1 of {len(guards)} tripped: torque" if lost else f"all {len(guards)} hold"
+    assert page.all("summary")[0].text == [f"Guards: {said}"]
+    assert ("open" in page.all("details")[0].attributes) == bool(lost)
+    for guard in guards:
+        (row,) = (row for row in page.rows() if row[0].startswith(f"{guard.name}: "))
+        assert len(row[0].split()) > 4
+        assert re.fullmatch(r"undefined|[\d.e-]+ (mm|%|flips|steps)", row[1])
+        assert row[2] == ("pass" if guard.ok else "FAIL")
+    sentence = "torque: a motor's torque had been clipped for more than 50 % of a second"
+    assert any(row[0] == sentence for row in page.rows())
+    assert "Guard(" not in page.source
 
 
 def test_every_metric_is_in_the_table(runs: dict[str, Path], pages: dict[str, Page]) -> None:

@@ -35,6 +35,13 @@ FIGURES = """() => [...document.querySelectorAll('figure')].map(figure => {
     };
 })"""
 
+TOO_WIDE = """() => {
+    document.querySelectorAll('details').forEach(folded => { folded.open = true; });
+    return [...document.querySelectorAll('table')]
+        .filter(table => table.scrollWidth > table.parentElement.clientWidth)
+        .map(table => [table.caption.textContent, table.scrollWidth]);
+}"""
+
 SEEN = """selector => {
     const style = getComputedStyle(document.querySelector(selector));
     return [style.color, style.stroke, style.backgroundColor];
@@ -99,6 +106,7 @@ def test_page_is_alone_drawn_and_fits(
     for width in WIDTHS:
         page.set_viewport_size({"width": width, "height": 800})
         assert page.evaluate("document.documentElement.scrollWidth") <= width
+        assert page.evaluate(TOO_WIDE) == []
         figures = page.evaluate(FIGURES)
         assert len(figures) == (7 if which == "one" else 6)
         for figure in figures:

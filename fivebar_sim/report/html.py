@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Sequence
-from html import escape
+from html import escape, unescape
 from importlib.metadata import version
 
 from fivebar_sim.metrics.measured import NOT_JUDGED, Verdict
@@ -36,9 +37,13 @@ table { border-collapse: collapse; font-variant-numeric: tabular-nums; }
 caption { text-align: left; color: var(--muted); font-size: .9rem; padding-bottom: .25rem; }
 th, td { padding: .2rem .9rem .2rem 0; border-bottom: 1px solid var(--grid); text-align: left;
   vertical-align: top; }
-th { font-weight: 600; }
+th { font-weight: 600; overflow-wrap: anywhere; }
 tbody th { font-weight: 400; }
 .number { text-align: right; white-space: nowrap; }
+td code { white-space: normal; font-size: .8em; }
+.words, thead .number { overflow-wrap: anywhere; white-space: normal; }
+details { margin: .75rem 0; }
+summary { cursor: pointer; font-weight: 600; }
 td small { display: block; color: var(--muted); }
 pre, code { font: .85rem/1.45 ui-monospace, monospace; }
 pre { overflow-x: auto; padding: .75rem; border: 1px solid var(--grid); border-radius: .4rem; }
@@ -47,8 +52,8 @@ pre { overflow-x: auto; padding: .75rem; border: 1px solid var(--grid); border-r
 footer { margin-top: 2rem; color: var(--muted); font-size: .9rem; }
 tbody th { min-width: 6.5rem; }
 @media (max-width: 40rem) {
-  table { font-size: .85rem; }
-  th, td { padding-right: .5rem; }
+  table { font-size: .8rem; }
+  th, td { padding-right: .4rem; }
 }
 @media print {
   body { max-width: none; padding: 0; font-size: 10pt; }
@@ -57,6 +62,10 @@ tbody th { min-width: 6.5rem; }
   pre { white-space: pre-wrap; overflow-wrap: anywhere; }
 }
 """
+
+
+LONGEST = 16
+"""Letters of a value that never goes over two lines, as numbers with a unit do."""
 
 
 class Cell(str):
@@ -104,6 +113,12 @@ def section(title: str, *parts: str) -> str:
     return "\n".join([f"<section>\n<h2>{text(title)}</h2>", *parts, "</section>"])
 
 
+def folded(said: str, *parts: str, is_open: bool = False) -> str:
+    """Return parts that are shown when their line is clicked."""
+    how = " open" if is_open else ""
+    return "\n".join([f"<details{how}><summary>{text(said)}</summary>", *parts, "</details>"])
+
+
 def figures(drawn: Sequence[Drawn]) -> str:
     """Return figures, side by side if there is room; call it within `look.project_style`."""
     parts = [
@@ -120,10 +135,13 @@ def table(caption: str, head: Sequence[object], rows: Iterable[Sequence[object]]
 
     A table wider than the page scrolls separately, also by keyboard.
     """
-    top = "".join(f'<th scope="col"{_class(k)}>{text(cell)}</th>' for k, cell in enumerate(head))
+    top = "".join(
+        f'<th scope="col"{_class(cell) if k else ""}>{text(cell)}</th>'
+        for k, cell in enumerate(head)
+    )
     body = "\n".join(
         f'<tr><th scope="row">{text(row[0])}</th>'
-        + "".join(f"<td{_class(1)}>{text(cell)}</td>" for cell in row[1:])
+        + "".join(f"<td{_class(cell)}>{text(cell)}</td>" for cell in row[1:])
         + "</tr>"
         for row in rows
     )
@@ -135,8 +153,16 @@ def table(caption: str, head: Sequence[object], rows: Iterable[Sequence[object]]
     )
 
 
-def _class(column: int) -> str:
-    return ' class="number"' if column else ""
+def _class(cell: object) -> str:
+    """Return the class of a cell: long text wraps, or its table would be wider than the page."""
+    letters = unescape(re.sub(r"<[^>]*>", "", text(cell)))
+    return ' class="number"' if len(letters) <= LONGEST else ' class="words"'
+
+
+def key(name: str) -> Cell:
+    """Return a dotted key as code that may wrap after its dots and underscores."""
+    broken = re.sub(r"([._])", r"\1<wbr>", escape(name))
+    return Cell(f"<code>{broken}</code>")
 
 
 def judgement(verdict: Verdict) -> Cell:

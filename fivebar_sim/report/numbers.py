@@ -76,6 +76,6 @@ def torque_band(run: StoredRun, motor: str) -> tuple[Array, Array] | None:
 
 
 def flat_metrics(run: StoredRun) -> dict[str, Any]:
-    """Return every metric by its dotted key, without verdict, limits and provenance."""
-    apart = ("verdict", "limits", "provenance")
+    """Return every metric by its dotted key, but for those with tables of their own."""
+    apart = ("verdict", "limits", "guards", "provenance")
     return dict(tables.flat({key: value for key, value in run.metrics.items() if key not in apart}))

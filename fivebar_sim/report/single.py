@@ -37,7 +37,7 @@ def page(run: StoredRun, drawn: list[Drawn]) -> str:
     scenario = run.scenario
     parts = [
         _head(run),
-        html.section("Limits", _limits(run)),
+        html.section("Limits", _limits(run), _guards(run)),
         html.section("What happened", html.figures(drawn)),
         html.section("How the motors shared the load", _load(run), *_phase(run)),
         html.section("All metrics", _metrics(run)),
@@ -74,21 +74,37 @@ def _head(run: StoredRun) -> str:
 
 
 def _limits(run: StoredRun) -> str:
-    """Return the table of limits and guards: bound, value, and whether it holds."""
+    """Return the table of limits: bound, value, and whether it holds."""
     rows = [
         (SHOWN[limit.key][0], bounds(limit), shown(limit.key, limit.value), html.verdict(limit.ok))
         for limit in numbers.limits(run)
     ]
+    if not rows:
+        return "<p>No limits are set: the run is not judged, but fails if a guard trips.</p>"
+    return html.table(
+        "The run passes if all of these hold.", ("metric", "limit", "value", ""), rows
+    )
 
-    for guard in run.measured.guards:
+
+def _guards(run: StoredRun) -> str:
+    """Return the guards, folded to one line; open if one tripped."""
+    guarded = run.measured.guards
+    lost = [guard.name for guard in guarded if not guard.ok]
+    rows: list[tuple[str, str, html.Cell]] = []
+
+    for guard in guarded:
         row = guards.ROWS[guard.name]
-        allowed = f"<= {row.show(guard.high)}"
-        value = row.show(guard.value)
-        rows.append((f"guard {row.name}", allowed, value, html.verdict(guard.ok)))
-    about = "The run passes if all of these hold."
-    if not run.scenario.limits:
-        about = "No limits are set: the run is not judged, but fails if a guard trips."
-    return html.table(about, ("metric", "limit", "value", ""), rows)
+        because = row.what.format(row.scale * guard.high)
+        # An undefined value is none, where the row would show a 0.
+        worst = "undefined" if guard.value is None else row.show(guard.value)
+        rows.append((f"{row.name}: {because}", worst, html.verdict(guard.ok)))
+
+    said = f"Guards: all {len(guarded)} hold"
+    if lost:
+        said = f"Guards: {len(lost)} of {len(guarded)} tripped: {', '.join(lost)}"
+    caption = "Each guard rejects the run as soon as its sentence is true."
+    table = html.table(caption, ("guard", "worst value", ""), rows)
+    return html.folded(said, table, is_open=bool(lost))
 
 
 def _load(run: StoredRun) -> str:
@@ -165,7 +181,7 @@ def _metrics(run: StoredRun) -> str:
             label = SHOWN[alike][0]
             read = shown(alike, value)
         label += ", in stance" if alike != key else ""
-        rows.append((label, read, plain(value), html.Cell(f"<code>{text(key)}</code>")))
+        rows.append((label, read, plain(value), html.key(key)))
 
     return html.table(
         "As in metrics.json, there in SI units.", ("metric", "value", "SI", "key"), rows
