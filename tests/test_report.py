@@ -222,7 +222,21 @@ def test_a_run_directory_with_its_report_stays_one(runs: dict[str, Path], tmp_pa
     assert directory.is_run(run)
     directory.check_place(run)
     rollout.run(stored.read(run).scenario).write(run)
+    # it was of the run before
     assert not (run / "report.html").exists()
+
+
+def test_the_command_writes_a_report_anew_where_there_was_one(
+    runs: dict[str, Path], shell: Shell, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(single, "figures", lambda run: [])  # that it is of the new run is enough
+    run = shutil.copytree(runs["limited"], shell.folder / "mine")
+    (run / "report.html").write_text("of the old run")
+    again = ("run", "mine/scenario.toml", "--quiet", "--set", "path.frequency=3.0")
+    assert shell(*again, "--out", "mine").status in (0, 1)
+    assert "frequency = 3.0" in (run / "report.html").read_text()
+    assert shell(*again, "--out", "other").status in (0, 1)
+    assert not (shell.folder / "other/report.html").exists()
 
 
 def test_command_says_where(

@@ -58,6 +58,10 @@ def look_up(table: Mapping[str, Any], key: str) -> Any:
     return table
 
 
+def refuse_link(*args: object, **how: object) -> NoReturn:
+    raise PermissionError(errno.EPERM, os.strerror(errno.EPERM))
+
+
 def refuse_constant(name: str) -> NoReturn:
     raise AssertionError(f"metrics.json says {name}")
 
@@ -168,12 +172,56 @@ def test_existing_run_and_empty_directory_are_exchanged(tmp_path: Path, result: 
     where = tmp_path / "mine"
     where.mkdir()
     result.write(where)
-    (where / "notes.txt").write_text("of the old run", encoding="utf-8")
     before = os.stat(where).st_ino
     result.write(where)
     assert names(where) == set(FILES)
     assert os.stat(where).st_ino != before
     assert names(tmp_path) == {"mine"}
+
+
+@pytest.mark.usefixtures("light")
+@pytest.mark.parametrize("links", [True, False])
+def test_running_again_deletes_only_the_own_files_of_the_run(
+    tmp_path: Path, result: Result, monkeypatch: pytest.MonkeyPatch, links: bool
+) -> None:
+    """Notes, folders and links stay; the old run's files, inputs and report go."""
+    where = rollout.run(Scenario.load("q8bot-trot", ["duration=2.1"])).write(tmp_path / "mine")
+    for name in ("notes.txt", "report.html", "deep/er/plot.png"):
+        (where / name).parent.mkdir(parents=True, exist_ok=True)
+        (where / name).write_text(f"my {name}", encoding="utf-8")
+    (where / "link").symlink_to("nowhere")
+    (where / "deep").chmod(0o750)
+    if not links:
+        monkeypatch.setattr(os, "link", refuse_link)
+    result.write(where)
+    assert names(where) == {*FILES, "notes.txt", "deep", "link"}
+    assert (where / "notes.txt").read_text(encoding="utf-8") == "my notes.txt"
+    assert (where / "deep/er/plot.png").read_text(encoding="utf-8") == "my deep/er/plot.png"
+    assert os.readlink(where / "link") == "nowhere"
+    assert (where / "deep").stat().st_mode & 0o777 == 0o750
+    assert (
+        json.loads((where / "metrics.json").read_text())["tracking"] == result.metrics["tracking"]
+    )
+    assert names(tmp_path) == {"mine"}
+
+
+@pytest.mark.usefixtures("light")
+def test_a_note_is_in_the_new_directory_before_the_old_one_is_moved(
+    tmp_path: Path, result: Result, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    where = result.write(tmp_path / "mine")
+    (where / "notes.txt").write_text("precious", encoding="utf-8")
+    rename = Path.rename
+    moved: list[str] = []
+
+    def watched(self: Path, target: Path) -> Path:
+        (stage,) = tmp_path.glob(".mine.*.partial")
+        moved.append((stage / "notes.txt").read_text(encoding="utf-8"))
+        return rename(self, target)
+
+    monkeypatch.setattr(Path, "rename", watched)
+    result.write(where)
+    assert moved == ["precious", "precious"]
 
 
 @pytest.mark.usefixtures("light")

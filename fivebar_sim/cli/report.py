@@ -22,8 +22,8 @@ def report(
 
     Args:
         run_dirs: Run directories that `fivebar run` wrote; several are compared with the first.
-        out: The page (default: RUN_DIR/report.html, which the next run there deletes; for several
-            runs comparison.html).
+        out: The page (default: RUN_DIR/report.html, which the next run there writes anew; for
+            several runs comparison.html).
         png: Folder for the figures as separate pictures.
         quiet: Print nothing but errors.
     """

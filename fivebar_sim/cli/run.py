@@ -34,7 +34,7 @@ def run(
     Args:
         scenarios: Names of shipped scenarios or paths of TOML files; by default all shipped ones.
         out: Run directory of one scenario, or the folder of several (default runs/NAME);
-            an existing run is replaced.
+            an existing run's own files are replaced, what you put beside them stays.
         settings: Change one key of every scenario, e.g. leg.L2=0.07 or "path.radii=[0.02, 0.01]";
             may be repeated. A new path.kind keeps the keys that both kinds have.
         live: Show the runs in a new Rerun viewer while they are simulated.
@@ -92,7 +92,7 @@ def _run(
         try:
             with spinner(f"simulating {name}", quiet=quiet):
                 result = _execute(planned, viewer)
-                result.write(place)
+                _write(result, place)
         # The other scenarios still run.
         except DivergedError as error:
             say(error)
@@ -107,6 +107,18 @@ def _run(
         shown = next(iter(metrics.values()), None) if len(plans) == 1 else metrics
         print(json.dumps(shown, indent=2, allow_nan=False))  # noqa: T201
     return status
+
+
+def _write(result: Result, place: Path) -> None:
+    """Write a run directory, and the report anew where there was one."""
+    from fivebar_sim.runs.kept import REPORT
+
+    reported = (place / REPORT).is_file()
+    result.write(place)
+    if reported:
+        from fivebar_sim import report
+
+        report.write([place], place / REPORT)
 
 
 def _places(plans: list[Plan], out: str | None) -> list[Path]:

@@ -10,11 +10,12 @@ from fivebar_sim.errors import ArgumentError, RunDirectoryError
 from fivebar_sim.files import whole_file
 from fivebar_sim.report import comparison, look, single
 from fivebar_sim.runs import stored
+from fivebar_sim.runs.kept import REPORT
 
 
 def place_of(runs: Sequence[Path]) -> Path:
     """Return the default place: RUN_DIR/report.html, or comparison.html here for several runs."""
-    return runs[0] / "report.html" if len(runs) == 1 else Path("comparison.html")
+    return runs[0] / REPORT if len(runs) == 1 else Path("comparison.html")
 
 
 def write(runs: Sequence[Path], out: Path | None = None, png: Path | None = None) -> list[Path]:

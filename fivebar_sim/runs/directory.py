@@ -18,9 +18,7 @@ from fivebar_sim.arrays import Array
 from fivebar_sim.errors import RunDirectoryError
 from fivebar_sim.files import leftovers, whole_file
 from fivebar_sim.recording import rrd
-
-FILES = ("scenario.toml", "metrics.json", "rollout.parquet", "recording.rrd")
-"""What a complete run directory holds."""
+from fivebar_sim.runs.kept import FILES, keep
 
 ATTEMPTS = 20
 """How often the exchange is tried while other processes write to the same place."""
@@ -32,7 +30,8 @@ OVERTAKEN = {errno.ENOENT, errno.ENOTEMPTY, errno.EEXIST}
 def write(result: rrd.Run, path: Path) -> Path:
     """Write a run directory beside its place, then rename it, so that it is never incomplete.
 
-    An existing run directory, or an empty one, is replaced; anything else there is refused.
+    An existing run directory, or an empty one, is replaced; anything else there is refused. What a
+    user has put beside the run's own files stays; a report of the old run goes with it.
 
     Raises:
         RunDirectoryError: The place is taken by something else, or cannot be written.
@@ -148,6 +147,7 @@ def _exchange(stage: Path, path: Path) -> None:
     """Rename stage to path, even while other processes write there: the last one wins."""
     for left in reversed(range(ATTEMPTS)):
         try:
+            keep(path, stage)
             return _renamed(stage, path)
         except OSError as error:
             if not left or error.errno not in OVERTAKEN:
