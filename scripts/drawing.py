@@ -15,10 +15,11 @@ from matplotlib.patches import Arc
 
 from fivebar_sim import FiveBar, kinematics
 from fivebar_sim.arrays import Array
+from fivebar_sim.render.palette import COLOURS
 
 OUT = Path(__file__).resolve().parent.parent / "docs" / "mechanism.svg"
-LEFT = "#1f77b4"
-RIGHT = "#e67e22"
+LEFT = COLOURS["A"].light
+RIGHT = COLOURS["E"].light
 DARK = "#2b2d31"
 GREY = "#888888"
 

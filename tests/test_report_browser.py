@@ -122,7 +122,7 @@ def test_page_is_alone_drawn_and_fits(
 
 def test_dark_and_light_and_print(browser: Browser, reports: dict[str, Path]) -> None:
     """Paper, letters and a line differ between light and dark; paper is printed white."""
-    selectors = ("body", "#torque text", "#tracking-error path[style*='--error']")
+    selectors = ("body", "#torque text", "#tracking-error path[style*='--foot']")
     looks = {}
     page, _ = opened(browser, reports["one"])
     for scheme in SCHEMES:

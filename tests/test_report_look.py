@@ -69,7 +69,7 @@ def test_colours_stand_out_from_light_and_dark_paper() -> None:
     assert contrast("#000000", "#ffffff") == pytest.approx(21.0)
     for dark, paper in enumerate(look.PAPER):
         for name, pair in look.COLOURS.items():
-            letters = name in ("ink", "muted", "gap", "error")
+            letters = name in ("ink", "muted", "target", "foot")
             assert contrast(pair[dark], paper) >= (4.5 if letters else 3.0), name
         for tint in draw.time_colours(24):
             assert contrast(tint, paper) >= 3.0, tint

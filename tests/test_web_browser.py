@@ -23,7 +23,7 @@ import pytest
 from fivebar_sim import rollout
 from fivebar_sim.arrays import Array, Bools
 from fivebar_sim.recording import rrd, web
-from fivebar_sim.recording.look import BLUE, LIGHT_BLUE, LIGHT_ORANGE, ORANGE, Colour
+from fivebar_sim.recording.look import Colour, shade
 from fivebar_sim.scenario import Scenario
 
 if TYPE_CHECKING:
@@ -96,7 +96,7 @@ def test_the_leg_is_in_sight_and_nothing_leaves_the_machine(browser: str, tmp_pa
         while min(seen) < ENOUGH and time.monotonic() < end:
             page.wait_for_timeout(300)
             picture = shot(page)
-            links = (ORANGE, LIGHT_ORANGE, LIGHT_BLUE, BLUE)
+            links = [shade(joint) for joint in "ABDE"]
             seen = [int(coloured(picture, link).sum()) for link in links]
         title = page.title()
         chromium.close()

@@ -12,7 +12,7 @@ import numpy as np
 from fivebar_sim.arrays import Array
 from fivebar_sim.geometry import FiveBar
 from fivebar_sim.recording.leg import HIP, in_space
-from fivebar_sim.recording.look import GREEN, RED, Colour, Look
+from fivebar_sim.recording.look import Colour, Look, shade
 from fivebar_sim.recording.poses import DrawnMotion
 
 if TYPE_CHECKING:
@@ -54,7 +54,7 @@ def log_foot(stream: rr.RecordingStream, target: Array, look: Look) -> None:
     import rerun as rr
 
     # Styles are logged once, static; `send_foot` sends the positions alone.
-    green = look.colour(GREEN)
+    green = look.colour(shade("target"))
     path = rr.LineStrips3D([in_space(target)], radii=rr.Radius.ui_points(1.5), colors=[green])
     stream.log(f"{look.root}{TARGET_PATH}", path, static=True)
     needle = rr.LineStrips3D.from_fields(radii=rr.Radius.ui_points(2.0), colors=[green])
@@ -63,7 +63,7 @@ def log_foot(stream: rr.RecordingStream, target: Array, look: Look) -> None:
     for band in TRAIL:
         line = rr.LineStrips3D.from_fields(
             radii=rr.Radius.ui_points(0.5 + 2.0 * band.fresh),
-            colors=[fade(look.colour(RED), band.fresh)],
+            colors=[fade(look.colour(shade("foot")), band.fresh)],
         )
         stream.log(f"{look.root}{band.entity}", line, static=True)
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from fivebar_sim.geometry import FiveBar
 from fivebar_sim.recording.leg import in_space
-from fivebar_sim.recording.look import GREY, LIGHT_GREY, YELLOW, Look
+from fivebar_sim.recording.look import GREY, LIGHT_GREY, Look, shade
 from fivebar_sim.recording.poses import DrawnMotion, Room
 
 if TYPE_CHECKING:
@@ -64,7 +64,9 @@ def send_ground(
     import rerun as rr
 
     if moved.force is not None:
-        arrow = rr.Arrows3D.from_fields(radii=[0.3 * leg.radius], colors=[look.colour(YELLOW)])
+        arrow = rr.Arrows3D.from_fields(
+            radii=[0.3 * leg.radius], colors=[look.colour(shade("force"))]
+        )
         stream.log(f"{look.root}{FORCE}", arrow, static=True)
         down = moved.force[:, 1] > 0.0
         contact = moved.world_foot - np.array([0.0, leg.foot_radius])

@@ -17,24 +17,19 @@ from numpy.typing import ArrayLike
 from fivebar_sim.arrays import Array
 from fivebar_sim.geometry import FiveBar
 from fivebar_sim.kinematics import bases, chain_points
-from fivebar_sim.recording.look import (
-    BLUE,
-    GREY,
-    LIGHT_BLUE,
-    LIGHT_ORANGE,
-    ORANGE,
-    PURPLE,
-    RED,
-    Colour,
-    Look,
-)
+from fivebar_sim.recording.look import GREY, LIGHT_GREY, Colour, Look, shade
 from fivebar_sim.recording.poses import DrawnMotion, in_height
 
 if TYPE_CHECKING:
     import rerun as rr
 
 HIP = "hip"
-COLOURS: dict[str, Colour] = {"L1": ORANGE, "L2": LIGHT_ORANGE, "L3": LIGHT_BLUE, "L4": BLUE}
+COLOURS: dict[str, Colour] = {
+    "L1": shade("A"),
+    "L2": shade("B"),
+    "L3": shade("D"),
+    "L4": shade("E"),
+}
 
 ACROSS = (math.sqrt(0.5), 0.0, 0.0, math.sqrt(0.5))
 """The turn (x, y, z, w) that lays a cylinder along y."""
@@ -91,13 +86,13 @@ def log_leg(stream: rr.RecordingStream, leg: FiveBar, look: Look) -> None:
         ("C", "L2", leg.L2, 0.0, 4.8 * r),
         ("D", "L4", leg.L4, r, 2.8 * r),
     ):
-        pin = _axle((length, y, 0.0), width, 0.6 * r, joint, PURPLE, look)
+        pin = _axle((length, y, 0.0), width, 0.6 * r, joint, LIGHT_GREY, look)
         stream.log(f"{hip}/{link}/{joint}", pin, static=True)
 
     foot = rr.Ellipsoids3D(
         radii=[leg.foot_radius],
         centers=in_space([leg.foot_offset]),
-        colors=[look.colour(RED)],
+        colors=[look.colour(shade("foot"))],
         labels=[look.label] if look.label else None,
         fill_mode="solid",
     )

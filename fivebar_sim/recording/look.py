@@ -4,30 +4,22 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-Colour = tuple[int, int, int]
+from fivebar_sim.render import palette
 
-# side A: L1, L2
-ORANGE = (224, 123, 57)
-LIGHT_ORANGE = (240, 173, 120)
-# side E: L4, L3
-BLUE = (52, 120, 190)
-LIGHT_BLUE = (120, 175, 225)
-GREEN = (60, 170, 90)
-RED = (214, 69, 80)
+Colour = palette.Rgb
+
+
+def shade(name: str) -> Colour:
+    """Return a colour of the palette in its shade for dark paper, since Rerun's views are dark."""
+    return palette.rgb(palette.COLOURS[name].dark)
+
+
 GREY = (96, 96, 102)
 LIGHT_GREY = (140, 140, 148)
-YELLOW = (226, 196, 60)
-PURPLE = (150, 70, 170)
+"""Floor, belt and base, which lie behind all others."""
 
-TINTS: tuple[Colour, ...] = (
-    (240, 140, 40),
-    (60, 150, 250),
-    (70, 200, 100),
-    (215, 80, 200),
-    (60, 200, 200),
-    (225, 70, 70),
-)
-"""The colours of runs that are shown together; the seventh run has the first colour again."""
+TINTS: tuple[Colour, ...] = tuple(palette.rgb(shades.dark) for shades in palette.RUNS)
+"""The colours of runs that are shown together; the ninth run has the first colour again."""
 TINTED = 0.7
 """Fraction of a run's own colour where several runs are shown; the rest is the part's colour."""
 

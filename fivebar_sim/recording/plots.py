@@ -11,16 +11,7 @@ from fivebar_sim.arrays import Array, Bools
 from fivebar_sim.metrics import ground, load
 from fivebar_sim.metrics.columns import COMMAND_COLUMNS, JOINT_COLUMNS, MOTORS, Record, motors
 from fivebar_sim.metrics.tracking import tracking_error
-from fivebar_sim.recording.look import (
-    BLUE,
-    GREEN,
-    GREY,
-    LIGHT_BLUE,
-    LIGHT_ORANGE,
-    ORANGE,
-    RED,
-    Colour,
-)
+from fivebar_sim.recording.look import Colour, shade
 from fivebar_sim.recording.poses import points, timestep
 
 if TYPE_CHECKING:
@@ -55,11 +46,13 @@ class Series(NamedTuple):
         return self.path.split("/")[0]
 
 
-MOTOR_COLOURS: dict[str, Colour] = dict(zip(MOTORS, (ORANGE, BLUE), strict=True))
-ANGLE_COLOURS: dict[str, Colour] = dict(
-    zip(JOINT_COLUMNS, (ORANGE, LIGHT_ORANGE, BLUE, LIGHT_BLUE), strict=True)
+MOTOR_COLOURS: dict[str, Colour] = {motor: shade(motor) for motor in MOTORS}
+ANGLE_COLOURS: dict[str, Colour] = {
+    name: shade(name.removeprefix("theta_")) for name in JOINT_COLUMNS
+}
+COMMAND_COLOURS: dict[str, Colour] = dict(
+    zip(COMMAND_COLUMNS, (shade("ink"), shade("muted")), strict=True)
 )
-COMMAND_COLOURS: dict[str, Colour] = dict(zip(COMMAND_COLUMNS, (RED, GREEN), strict=True))
 
 
 def series(scenario: Scenario, record: Record) -> Iterator[Series]:
@@ -74,11 +67,22 @@ def series(scenario: Scenario, record: Record) -> Iterator[Series]:
     in_torque = getattr(scenario.controller, "drive", "position") == "torque"
 
     yield Series(
-        "tracking_error", "Tracking error [mm]", {"error": RED}, 1e3 * error[:, None], every
+        "tracking_error",
+        "Tracking error [mm]",
+        {"error": shade("foot")},
+        1e3 * error[:, None],
+        every,
     )
     yield from _torques(scenario, record, torque, every, in_torque=in_torque)
-    yield Series("load_share", "Load share of A", {"A": ORANGE}, share[:, None], loaded, (0.0, 1.0))
-    yield Series("gap", "Loop gap [um]", {"gap": GREEN}, 1e6 * record["gap"][:, None], every)
+    yield Series(
+        "load_share",
+        "Load share of A [%]",
+        {"A": shade("A")},
+        1e2 * share[:, None],
+        loaded,
+        (0.0, 100.0),
+    )
+    yield Series("gap", "Loop gap [um]", {"gap": shade("ink")}, 1e6 * record["gap"][:, None], every)
     angles = ANGLE_COLOURS if in_torque else ANGLE_COLOURS | COMMAND_COLOURS
     title = "Joint angles [deg]" if in_torque else "Joint angles, setpoints [deg]"
     yield Series("angles", title, angles, np.degrees(_columns(record, *angles)), every)
@@ -86,8 +90,14 @@ def series(scenario: Scenario, record: Record) -> Iterator[Series]:
     if "ground_z" in record:
         height = 1e3 * ground.height(scenario.leg, record)[:, None]
         force = points(record, "ground")
-        yield Series("ground_force", "Ground force [N]", {"x": ORANGE, "z": BLUE}, force, every)
-        yield Series("foot_height", "Foot height [mm]", {"foot": GREEN}, height, every)
+        yield Series(
+            "ground_force",
+            "Ground force [N]",
+            {"x": shade("muted"), "z": shade("force")},
+            force,
+            every,
+        )
+        yield Series("foot_height", "Foot height [mm]", {"foot": shade("foot")}, height, every)
 
 
 def _torques(
@@ -101,7 +111,9 @@ def _torques(
         yield Series("torque/ctrl", title, COMMAND_COLOURS, 1e3 * motors(record, "ctrl"), every)
     if limit is not None:
         both = np.tile([1e3 * limit, -1e3 * limit], (len(every), 1))
-        yield Series("torque/limit", title, {"limit": GREY, "-limit": GREY}, both, every)
+        yield Series(
+            "torque/limit", title, dict.fromkeys(("limit", "-limit"), shade("muted")), both, every
+        )
 
 
 def _columns(record: Record, *names: str) -> Array:

@@ -14,6 +14,7 @@ import numpy as np
 
 from fivebar_sim import kinematics
 from fivebar_sim.arrays import Array
+from fivebar_sim.render.palette import COLOURS, unit_rgb
 from fivebar_sim.render.pen import Colour, Pen
 from fivebar_sim.render.replay import Replay
 
@@ -31,10 +32,10 @@ SLATS = 8
 GEOMS = 2000
 """Most geoms of a scene."""
 
-GREEN = (0.12, 0.60, 0.30)
-RED = (0.84, 0.16, 0.24)
+TARGET = unit_rgb(COLOURS["target"].light)
+FOOT = unit_rgb(COLOURS["foot"].light)
 PALE = (0.93, 0.78, 0.80)
-VIOLET = (0.45, 0.15, 0.70)
+FORCE = unit_rgb(COLOURS["force"].light)
 SLAT = (0.50, 0.53, 0.57)
 PIN = (0.90, 0.91, 0.93)
 
@@ -158,15 +159,15 @@ def decorate(scene: mujoco.MjvScene, replay: Replay, row: int, eye: Array) -> No
     path = pen.before(_path(replay) + hip)
 
     for start, end in pairwise(path):
-        pen.bar(start, end, 0.15 * leg.foot_radius, GREEN)
+        pen.bar(start, end, 0.15 * leg.foot_radius, TARGET)
 
     trail = pen.before(_trail(replay, row) + hip)
     for k, (start, end) in enumerate(pairwise(trail)):
         part = (k + 1) / TRAIL_PARTS
         width = (0.08 + 0.24 * part) * leg.foot_radius
-        pen.bar(start, end, width, _mix(PALE, RED, part))
+        pen.bar(start, end, width, _mix(PALE, FOOT, part))
 
-    pen.ball(pen.before(replay.target[row] + hip), 0.5 * leg.foot_radius, GREEN)
+    pen.ball(pen.before(replay.target[row] + hip), 0.5 * leg.foot_radius, TARGET)
     _force(pen, replay, row, hip)
     if replay.belt is not None:
         _belt(pen, replay, row)
@@ -202,7 +203,7 @@ def _force(pen: Pen, replay: Replay, row: int, hip: Array) -> None:
     if np.hypot(*force) > 0.01 * largest:
         start = replay.foot[row] + hip - (0.0, leg.foot_radius)
         tip = start + leg.size * force / largest
-        pen.arrow(pen.before(start, 2.0), pen.before(tip, 2.0), 0.45 * leg.foot_radius, VIOLET)
+        pen.arrow(pen.before(start, 2.0), pen.before(tip, 2.0), 0.45 * leg.foot_radius, FORCE)
 
 
 def _belt(pen: Pen, replay: Replay, row: int) -> None:

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fivebar_sim.arrays import Array, Bools
-from fivebar_sim.report.look import TIME, WIDTH, colour
+from fivebar_sim.render.palette import TIME
+from fivebar_sim.report.look import WIDTH, colour
 from fivebar_sim.runs.stored import StoredRun
 
 if TYPE_CHECKING:

@@ -24,8 +24,8 @@ h3 { font-size: 1rem; margin: 0 0 .25rem; }
 p { margin: .5rem 0; overflow-wrap: anywhere; }
 .verdict { display: inline-block; padding: .1rem .7rem; border: 2px solid; border-radius: .4rem;
   font-weight: 700; }
-.pass { color: var(--gap); }
-.fail { color: var(--error); font-weight: 700; }
+.pass { color: var(--target); }
+.fail { color: var(--foot); font-weight: 700; }
 .unjudged { color: var(--muted); }
 .figures { display: grid; gap: 1.5rem;
   grid-template-columns: repeat(auto-fit, minmax(min(100%, 27rem), 1fr)); }

@@ -43,7 +43,7 @@ def foot_path(run: StoredRun) -> Drawn:
     """Draw the foot's path, coloured by time, over its target."""
     foot, target = (1e3 * points(run.record, name) for name in ("foot", "target"))
     figure, ax = draw.plane(4.4)
-    ax.plot(*target.T, color=colour("muted"), lw=6.0, alpha=0.4, label="target")
+    ax.plot(*target.T, color=colour("target"), lw=6.0, alpha=0.4, label="target")
     ends = np.linspace(0, len(foot) - 1, PIECES + 1).astype(int)
 
     for k, tint in enumerate(draw.time_colours(PIECES)):
@@ -59,8 +59,8 @@ def foot_path(run: StoredRun) -> Drawn:
     return Drawn(
         "foot-path",
         "Foot path",
-        f"The foot's path over its target in the hip frame, {rms} RMS apart; from blue and wide "
-        "(early) to orange and thin (late).",
+        f"The foot's path over its target in the hip frame, {rms} RMS apart; from teal and wide "
+        "(early) to pink and thin (late).",
         f"The foot's path in the leg plane, coloured by time, over its target; {rms} RMS apart.",
         figure,
     )
@@ -110,7 +110,7 @@ def leg_moments(run: StoredRun) -> Drawn:
         ):
             ax.plot(*(1e3 * np.array(chain)).T, "o-", color=colour(name), ms=3, **look)
 
-    ax.plot(*(1e3 * points(run.record, "foot")).T, color=colour("error"), lw=1.0)
+    ax.plot(*(1e3 * points(run.record, "foot")).T, color=colour("foot"), lw=1.0)
     for letter, point in (("A", A), ("B", p.B[-1]), ("C", p.C_left[-1]), ("D", p.D[-1]), ("E", E)):
         ax.annotate(letter, tuple(1e3 * point), (4, 4), textcoords="offset points", weight="bold")
 
@@ -120,7 +120,7 @@ def leg_moments(run: StoredRun) -> Drawn:
         "The leg over its workspace",
         f"The leg in {len(rows)} poses from {times[0]:.4g} s to {times[-1]:.4g} s, evenly along "
         f"the foot's path, the last one bold. Shaded: what the foot reaches in this working mode, "
-        f"a shade deeper every {1e3 * deepest / BANDS:.3g} mm from the edge; violet: B, C and D in "
+        f"a shade deeper every {1e3 * deepest / BANDS:.3g} mm from the edge; teal: B, C and D in "
         "line.",
         f"The leg {run.scenario.leg.name} in {len(rows)} poses along its foot path, over the "
         "region that its foot reaches.",

@@ -14,6 +14,8 @@ from contextlib import contextmanager
 from html import escape
 from typing import TYPE_CHECKING, Any
 
+from fivebar_sim.render import palette
+
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
@@ -21,29 +23,16 @@ PAPER = ("#ffffff", "#15181d")
 """The page itself, in light and in dark."""
 
 COLOURS = {
-    "ink": ("#24292f", "#d7dce2"),
-    "muted": ("#68717b", "#959eaa"),
-    "A": ("#c2540a", "#f0924c"),
-    "E": ("#1f6fb5", "#62aef0"),
-    "error": ("#c4314b", "#ff7b8b"),
-    "gap": ("#2a7f4f", "#5cc48a"),
-    "singular": ("#a33bb5", "#d88ae6"),
-    "run-1": ("#0f6cbd", "#63b3ff"),
-    "run-2": ("#c4510c", "#f59a57"),
-    "run-3": ("#1b7f5a", "#4fcf9d"),
-    "run-4": ("#a8328f", "#ee8fd8"),
-    "run-5": ("#7a6a00", "#d6c23f"),
-    "run-6": ("#5b4bc4", "#a99cff"),
-    "run-7": ("#b02a37", "#ff8088"),
-    "run-8": ("#4a5560", "#aab4be"),
+    name: (shades.light, shades.dark)
+    for name, shades in {
+        **palette.COLOURS,
+        **{f"run-{k + 1}": shades for k, shades in enumerate(palette.RUNS)},
+    }.items()
 }
 """Colours of lines, in light and in dark; each contrasts with the page."""
 
 SOFT = {"grid": ("#dde1e6", "#31373f"), "wash": ("#7d8794", "#8b95a3")}
 """Colours of what lies behind the lines."""
-
-TIME = ("#2f7fd0", "#9a66c4", "#c8589a", "#d0702a")
-"""From early to late; all of them contrast with light and with dark pages."""
 
 WIDTH = 5.4
 """Width of a figure [in]: small enough that its text stays readable on a phone."""

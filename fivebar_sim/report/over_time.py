@@ -30,7 +30,7 @@ def tracking_error(run: StoredRun) -> Drawn:
     rms = look_up(run.metrics, "tracking.rms") or 0.0
     scale, unit = draw.length_unit(float(error.max()))
     figure, (ax,) = draw.panels(1, height=2.9)
-    draw.line(ax, run.record["time"], scale * error, "error")
+    draw.line(ax, run.record["time"], scale * error, "foot")
     levels = {"RMS": shown("tracking.rms", rms), "95 %": shown("tracking.rms", most)}
 
     for value, style, name in ((rms, "--", "RMS"), (most, ":", "95 %")):
@@ -108,7 +108,7 @@ def _torque(ax: Axes, run: StoredRun, motor: str, largest: float) -> None:
 
     if band is not None and limit is not None and limit <= IN_VIEW * largest:
         for edge in band:
-            draw.line(ax, time, 1e3 * edge, "error", ls="-.", lw=1.0)
+            draw.line(ax, time, 1e3 * edge, "muted", ls="-.", lw=1.0)
             room = max(room, 1.05e3 * float(np.abs(edge).max()))
 
     draw.shade_unmeasured(ax, run)
@@ -148,7 +148,7 @@ def loop_gap(run: StoredRun) -> Drawn:
     rms, most = (shown(key, look_up(run.metrics, key)) for key in ("closure.rms", "closure.max"))
     scale, unit = draw.length_unit(float(gap.max()))
     figure, (ax,) = draw.panels(1, height=2.4)
-    draw.line(ax, run.record["time"], scale * gap, "gap")
+    draw.line(ax, run.record["time"], scale * gap, "ink")
     ax.set(ylabel=f"gap at C [{unit}]", ylim=(0.0, draw.ceiling(scale * gap)))
     ax.set_xlim(0.0, run.record["time"][-1])
 
@@ -172,7 +172,7 @@ def ground_contact(run: StoredRun) -> Drawn | None:
     height = 1e3 * ground.height(run.scenario.leg, run.record)
     figure, axes = draw.panels(3, 2, height=4.4)
 
-    for name, axis in (("singular", "z"), ("gap", "x")):
+    for name, axis in (("force", "z"), ("muted", "x")):
         values: Array = run.record[f"ground_{axis}"]
         draw.line(axes[0], time, values, name, label=f"force along {axis}")
 
