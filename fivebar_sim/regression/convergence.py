@@ -1,0 +1,231 @@
+"""How the metrics of a run converge as its timestep is halved, and to what.
+
+With v(h) = limit + c h^p, three runs at h, h / 2 and h / 4 give order and limit:
+
+    2^p = (v(h) - v(h/2)) / (v(h/2) - v(h/4)),   limit = v(h/4) + (v(h/4) - v(h/2)) / (2^p - 1)
+
+With more halvings the three finest runs decide. The extrapolation is Richardson's; it says nothing
+about an error that all timesteps share, such as that of a contact that is too soft.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
+
+import msgspec
+
+from fivebar_sim import rollout
+from fivebar_sim.errors import ConfigError, DivergedError
+from fivebar_sim.integrator import Integrator
+from fivebar_sim.metrics import guards
+from fivebar_sim.metrics.catalogue import ABSOLUTE
+from fivebar_sim.metrics.limits import look_up
+from fivebar_sim.scenario import Scenario
+from fivebar_sim.scenario.scenario import MOST_STEPS
+
+FEWEST = 2
+MOST = 6
+"""Halvings of the timestep: two give the three runs that an order needs."""
+
+SLOWEST = 0.5
+"""Lowest order that is extrapolated: below it the limit would be far beyond all runs."""
+
+ROUNDING = 1e-9
+"""Differences below this part of a value are rounding."""
+
+NUMERICAL = ("closure.rms", "closure.max")
+"""Metrics that are left out: the loop's gap is an error of the step itself, and its limit is 0."""
+
+OTHER: dict[str, Integrator] = {"discrete": "implicitfast", "implicitfast": "discrete"}
+
+
+class Convergence(NamedTuple):
+    """How one metric converges.
+
+    Attributes:
+        value: At the timestep h of the scenario.
+        limit: Extrapolated to h = 0; None where the values do not converge.
+        order: p; None where the values do not converge, or no longer change.
+        error: |value - limit| / |limit|; where the values do not converge, their range as a part of
+            the finest one. None where that is undefined, as of a limit that is 0.
+    """
+
+    value: float | None
+    limit: float | None
+    order: float | None
+    error: float | None
+
+
+class Study(NamedTuple):
+    """The runs of one scenario under one integrator, from the coarsest to the finest.
+
+    Attributes:
+        integrator: MuJoCo's integrator.
+        timesteps: [s].
+        metrics: How each metric of a baseline converges, by dotted key.
+        tripped: The messages of the guards that tripped at each timestep.
+    """
+
+    integrator: Integrator
+    timesteps: list[float]
+    metrics: dict[str, Convergence]
+    tripped: list[list[str]]
+
+
+def converge(values: Sequence[float | None], tolerance: float = 0.0) -> Convergence:
+    """Return how a value converges.
+
+    Args:
+        values: At h, h / 2, h / 4, ...: at least three.
+        tolerance: Values that differ by no more are settled.
+    """
+    numbers = [each for each in values if each is not None]
+    if len(numbers) < len(values):
+        # Undefined everywhere is as settled as it gets; defined here and there is not.
+        return Convergence(values[0], None, None, None if numbers else 0.0)
+
+    first = numbers[0]
+    coarse, middle, finest = numbers[-3:]
+    spread = max(numbers) - min(numbers)
+    rounding = ROUNDING * abs(finest)
+    if spread <= tolerance or abs(middle - finest) <= rounding:
+        return Convergence(first, finest, None, _relative(first - finest, finest))
+
+    ratio = (coarse - middle) / (middle - finest)
+    if not ratio >= 2.0**SLOWEST:
+        return Convergence(first, None, None, _relative(spread, finest))
+
+    limit = finest + (finest - middle) / (ratio - 1.0)
+    return Convergence(first, limit, math.log2(ratio), _relative(first - limit, limit))
+
+
+def _relative(difference: float, of: float) -> float | None:
+    """Return |difference / of|; 0 / 0 is 0, and None stands for infinity."""
+    if difference == 0.0:
+        return 0.0
+    return abs(difference / of) if of != 0.0 else None
+
+
+def holds(found: Convergence, bar: float, tolerance: float) -> bool:
+    """Return whether a value is as good as its limit.
+
+    Args:
+        found: How it converges.
+        bar: Largest relative error.
+        tolerance: Largest absolute error, for values that are next to nothing.
+    """
+    if found.error is not None and found.error <= bar:
+        return True
+    if found.value is None or found.limit is None:
+        return False
+    return abs(found.value - found.limit) <= tolerance
+
+
+def refined(scenario: Scenario, parts: int, integrator: Integrator) -> Scenario:
+    """Return the same experiment in finer steps.
+
+    A bus's rate and delay and the delay of sensors are rounded to whole timesteps; here to those of
+    the scenario itself, so that commands come and act at the same times. Control periods are whole
+    timesteps already.
+
+    Args:
+        scenario: The experiment.
+        parts: Into how many steps each of its timesteps is cut.
+        integrator: MuJoCo's integrator.
+
+    Raises:
+        ConfigError: The run has too many steps.
+    """
+    h = scenario.sim.timestep
+    if scenario.steps * parts > MOST_STEPS:
+        raise ConfigError(
+            f"{scenario.name}: a run may have {MOST_STEPS} steps, got {scenario.steps * parts} at "
+            f"a timestep of {h / parts:g} s"
+        )
+
+    servo = scenario.servo
+    if servo.rate is not None:
+        # The least is one step: a bus may be as fast as the timesteps.
+        period = max(h, _whole(1.0 / servo.rate, h))
+        whole = math.isclose(1.0, servo.rate * period)
+        servo = msgspec.structs.replace(servo, rate=servo.rate if whole else 1.0 / period)
+    sensors = scenario.sensors
+    return msgspec.structs.replace(
+        scenario,
+        servo=msgspec.structs.replace(servo, delay=_whole(servo.delay, h)),
+        sensors=msgspec.structs.replace(sensors, delay=_whole(sensors.delay, h)),
+        sim=msgspec.structs.replace(scenario.sim, timestep=h / parts, integrator=integrator),
+    )
+
+
+def _whole(seconds: float, timestep: float) -> float:
+    """Return a time in whole timesteps [s]."""
+    # Within rounding it is whole already: its last bits are the scenario's.
+    steps = round(min(seconds / timestep, MOST_STEPS))
+    return seconds if math.isclose(seconds, steps * timestep) else steps * timestep
+
+
+def plans(scenario: Scenario, halvings: int, integrator: Integrator) -> list[rollout.Plan]:
+    """Return the plans at h, h / 2, ...; see `refined`.
+
+    Raises:
+        ConfigError: Too few or too many halvings, or a run that has too many steps.
+    """
+    if not FEWEST <= halvings <= MOST:
+        raise ConfigError(f"halvings must be {FEWEST} to {MOST}, got {halvings}")
+    return [rollout.plan(refined(scenario, 2**n, integrator)) for n in range(halvings + 1)]
+
+
+def study(planned: Sequence[rollout.Plan]) -> Study:
+    """Return how the metrics of plans at h, h / 2, ... converge.
+
+    Raises:
+        DivergedError: A simulation broke down; says which, and when.
+    """
+    results = [_executed(each) for each in planned]
+    tables = [result.metrics for result in results]
+    keys = [key for key in ABSOLUTE if key.split(".")[0] in tables[0] and key not in NUMERICAL]
+    return Study(
+        integrator=planned[0].scenario.sim.integrator,
+        timesteps=[each.scenario.sim.timestep for each in planned],
+        metrics={
+            key: converge([look_up(table, key) for table in tables], ABSOLUTE[key]) for key in keys
+        },
+        tripped=[guards.tripped(result.measured.guards) for result in results],
+    )
+
+
+def _executed(planned: rollout.Plan) -> rollout.Result:
+    try:
+        return rollout.execute(planned)
+    except DivergedError as error:
+        sim = planned.scenario.sim
+        which = f"{sim.integrator} at a timestep of {sim.timestep:g} s"
+        raise DivergedError(f"{which}: {error}", error.time) from None
+
+
+def written(found: Study) -> dict[str, Any]:
+    """Return a study as JSON has it."""
+    return {
+        "integrator": found.integrator,
+        "timesteps": found.timesteps,
+        "metrics": {key: each._asdict() for key, each in found.metrics.items()},
+        "tripped": found.tripped,
+    }
+
+
+def failures(found: Study, bar: float, allowed: Mapping[str, float]) -> list[str]:
+    """Return the keys of the metrics whose error at h is above the bar.
+
+    Args:
+        found: The study.
+        bar: Largest relative error.
+        allowed: Metrics with a bar of their own, as the scenario's table [converge] has them.
+    """
+    return [
+        key
+        for key, each in found.metrics.items()
+        if not holds(each, max(bar, allowed.get(key, 0.0)), ABSOLUTE[key])
+    ]
