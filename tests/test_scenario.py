@@ -210,7 +210,7 @@ def test_name_that_is_no_file_name_is_refused(tmp_path: Path, name: str) -> None
 @pytest.mark.parametrize(
     ("setting", "message"),
     [
-        ("duratoin=1", "unknown key 'duratoin'; known: controller, duration, force, guards,"),
+        ("duratoin=1", "unknown key 'duratoin'; known: controller, converge, duration, force,"),
         ("name=1", "name must be a plain file name of 1 to 200 bytes, got 1"),
         (
             "scene=aire",
@@ -301,3 +301,12 @@ def test_unknown_source_is_refused(tmp_path: Path) -> None:
         Scenario.load(tmp_path / "no.toml")
     with pytest.raises(ConfigError, match=r"^x: name must be a plain file name"):
         Scenario.from_table({}, "x", tmp_path)
+
+
+def test_own_bars_of_convergence_survive_a_run_directory() -> None:
+    scenario = Scenario.load("classic-ellipse", ["converge.tracking.rms=0.5"])
+    assert scenario.converge == {"tracking.rms": 0.5}
+    table = scenario.table()
+    assert table["converge"] == {"tracking.rms": 0.5}
+    assert Scenario.from_table(table, "again", Path()).converge == scenario.converge
+    assert "converge" not in Scenario.load("classic-ellipse").table()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Callable
 from pathlib import Path
@@ -16,6 +17,7 @@ from fivebar_sim.errors import ArgumentError, ConfigError, unknown
 from fivebar_sim.files import tables
 from fivebar_sim.files.tables import Table
 from fivebar_sim.geometry import FiveBar
+from fivebar_sim.metrics.catalogue import LIMIT_KEYS
 from fivebar_sim.paths import FootPath
 from fivebar_sim.scenario import forces, scenes
 from fivebar_sim.scenario.forces import FootForce
@@ -29,6 +31,9 @@ LONGEST_NAME = 200
 
 SHORT = {"leg": "preset", "servo": "preset", "scene": "kind"}
 """Tables that may be given as a string, and the key that the string is short for."""
+
+BY_METRIC = ("limits", "converge")
+"""Tables whose keys are metrics."""
 
 KINDS_OF = {"path": paths.KINDS, "scene": scenes.KINDS, "force": forces.KINDS}
 """Tables whose `kind` decides which other keys they have."""
@@ -47,10 +52,10 @@ def change(table: Table, parts: list[str], value: Any, where: str) -> None:
         table[top] = {SHORT[top]: table[top]}
 
     # A metric's dotted key is one key, and the file may have written it as nested tables.
-    if top == "limits" and len(parts) > 1:
-        if isinstance(table.get("limits"), dict):
-            table["limits"] = dict(tables.flat(table["limits"]))
-        parts = ["limits", ".".join(parts[1:])]
+    if top in BY_METRIC and len(parts) > 1:
+        if isinstance(table.get(top), dict):
+            table[top] = dict(tables.flat(table[top]))
+        parts = [top, ".".join(parts[1:])]
 
     tables.put(table, parts, value, where)
     if not isinstance(value, str):
@@ -102,6 +107,22 @@ def servo(value: Any, where: str, folder: Path) -> Servo:
 
     base, own = _preset("servo", read_servo, check, value, where, folder)
     return tables.convert({**base, **own}, Servo, "servo", where)
+
+
+def converge(value: Any, where: str) -> dict[str, float]:
+    """Return the table [converge]: relative errors by metric.
+
+    Raises:
+        ConfigError: Not a table, an unknown key, or an error that is not a number of at least 0.
+    """
+    allowed = tables.bounds(value, LIMIT_KEYS, "converge", where)
+    for key, (low, high) in allowed.items():
+        if low != -math.inf or not high >= 0.0:
+            raise ConfigError(
+                f"{where}: converge.{key} must be a relative error in [0, inf), got "
+                f"{high if low == -math.inf else [low, high]}"
+            )
+    return {key: high for key, (_, high) in allowed.items()}
 
 
 def _table(name: str, value: Any, where: str) -> Table:

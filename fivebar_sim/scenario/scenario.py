@@ -33,7 +33,7 @@ MOST_STEPS = 5_000_000
 
 KEYS = (
     *("name", "leg", "scene", "duration", "path", "force", "servo", "sensors", "controller"),
-    *("sim", "guards", "limits"),
+    *("sim", "guards", "limits", "converge"),
 )
 
 
@@ -55,6 +55,8 @@ class Scenario(msgspec.Struct, frozen=True, kw_only=True):
         sim: Timestep, integrator, seed.
         guards: Bounds beyond which the physics of the run cannot be trusted.
         limits: Metric's dotted key to (low, high).
+        converge: Metric's dotted key to the relative error that the timestep may cause, for those
+            metrics that `fivebar converge` would refuse.
     """
 
     name: str
@@ -70,6 +72,7 @@ class Scenario(msgspec.Struct, frozen=True, kw_only=True):
     sim: Sim = Sim()
     guards: Guards = Guards()
     limits: dict[str, tuple[float, float]] = {}
+    converge: dict[str, float] = {}
 
     @property
     def steps(self) -> int:
@@ -172,6 +175,7 @@ class Scenario(msgspec.Struct, frozen=True, kw_only=True):
             sim=tables.convert(table.get("sim", {}), Sim, "sim", where),
             guards=tables.convert(table.get("guards", {}), Guards, "guards", where),
             limits=tables.bounds(table.get("limits", {}), LIMIT_KEYS, "limits", where),
+            converge=reading.converge(table.get("converge", {}), where),
         )
         # Last: these compare the tables with each other, each of which is legal by now.
         _check_window(scenario, where)
@@ -235,6 +239,7 @@ class Scenario(msgspec.Struct, frozen=True, kw_only=True):
                 key: high if low == -math.inf else [low, high]
                 for key, (low, high) in self.limits.items()
             },
+            "converge": dict(self.converge) or None,
         }
         return _present(table)
 
