@@ -34,7 +34,9 @@ LEVELS = (
 """Rooms from the bottom to the top: each may import those of the lines above its own."""
 
 MOST_AT_THE_TOP = 15
-MOST_IN_A_ROOM = 14
+MOST_IN_A_ROOM = 15
+"""Modules. The largest room is `cli`: one module for each command, and what they share."""
+
 
 MOST_IN_A_FUNCTION = 30
 MOST_IN_A_FILE = 150

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from typing import TYPE_CHECKING
 
 from rich import box
@@ -18,7 +18,9 @@ from fivebar_sim.metrics.measured import NOT_JUDGED
 
 if TYPE_CHECKING:
     from fivebar_sim.regression.comparison import Checked, Row
+    from fivebar_sim.regression.convergence import Study
     from fivebar_sim.rollout import Result
+    from fivebar_sim.scenario import Scenario
 
 WIDEST = 300
 """Widest table in a file or a pipe, in characters; there a table takes what it needs."""
@@ -93,6 +95,43 @@ def print_check(checked: Sequence[Checked], console: Console) -> None:
             console.print(f"{word}: {escape(each.name)}: {escape(line)}", soft_wrap=True)
 
 
+def print_convergence(
+    scenario: Scenario,
+    found: Study,
+    other: Study | None,
+    failed: Collection[str],
+    console: Console,
+) -> None:
+    """Print how a scenario's metrics converge; then guards that tripped on the way."""
+    h = found.timesteps[0]
+    title = f"{scenario.name}: {found.integrator}, h = {1e3 * h:g} ms and finer"
+    beside = [] if other is None else [other.integrator]
+    table = _table(escape(title), ["metric", "at h", "limit", "order", "error", *beside, ""], gap=0)
+    for key, each in found.metrics.items():
+        order = "" if each.order is None else f"{each.order:.1f}"
+        error = "undefined" if each.error is None else f"{1e2 * each.error:.1f} %"
+        limits = [_limit(key, study) for study in (found, other) if study is not None]
+        row = (shown(key, each.value), limits[0], order, error, *limits[1:])
+        table.add_row(SHOWN[key][0], *row, verdict(key not in failed))
+
+    console.print(table)
+    for study in (found, other):
+        for line in [] if study is None else _tripped(study):
+            console.print(f"note: {escape(line)}", soft_wrap=True)
+
+
+def _limit(key: str, study: Study) -> str:
+    """Return a metric's limit; "none" where it does not converge."""
+    limit = study.metrics[key].limit
+    return "none" if limit is None else shown(key, limit)
+
+
+def _tripped(study: Study) -> list[str]:
+    """Return the messages of the guards that tripped, with the run that they are of."""
+    runs = zip(study.timesteps, study.tripped, strict=True)
+    return [f"{study.integrator} at {1e3 * h:g} ms: {line}" for h, said in runs for line in said]
+
+
 def _word(row: Row) -> str:
     """Return a metric's verdict with rich's colour tags."""
     plain = row.verdict in ("pass", "FAIL")
@@ -103,6 +142,6 @@ def _table(title: str, columns: Sequence[str], gap: int = 1) -> Table:
     """Return an empty table: numbers aligned right, no wrapping, for 80 columns."""
     table = Table(title=title, box=box.SIMPLE_HEAD, title_justify="left", padding=(0, gap, 0, 0))
     for column in columns:
-        number = column in ("value", "limit", "baseline", "now", "change")
+        number = column not in ("metric", "verdict", "")
         table.add_column(column, justify="right" if number else "left", no_wrap=True)
     return table

@@ -18,7 +18,7 @@ from fivebar_sim.cli import memory, plain, signals
 from fivebar_sim.cli.status import FAILED, INTERRUPTED, UNREAD, WRONG, say
 from fivebar_sim.errors import DivergedError, FiveBarError
 
-COMMANDS = ("run", "check", "replay", "report", "render", "view", "workspace")
+COMMANDS = ("run", "check", "converge", "replay", "report", "render", "view", "workspace")
 """The commands; each is a function in the module of its name in `fivebar_sim.cli`."""
 
 HELP = {"-h", "--help"}

@@ -1,0 +1,90 @@
+"""The command `fivebar converge`: what it finds, prints and refuses."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+from shell import Shell
+
+from fivebar_sim import rollout
+from fivebar_sim.errors import DivergedError
+from fivebar_sim.metrics.catalogue import ABSOLUTE
+
+WRONG = ("treadmill-trot", "--set", "sim.integrator=implicitfast")
+"""A run whose share is wrong by half."""
+
+
+def test_wrong_share_is_seen(shell: Shell) -> None:
+    """It passes every guard at 1 ms; three runs give the limit that `discrete` has too."""
+    said = shell("converge", *WRONG, "--json")
+    found = json.loads(said.out)
+    assert said.status == 1
+    assert found["timesteps"] == [1e-3, 5e-4, 2.5e-4]
+    assert found["tripped"][1:] == [[], []]
+    share = found["metrics"]["load.share_A"]
+    torque = found["metrics"]["load.torque_rms.A"]
+    assert share["value"] < 0.19
+    assert share["limit"] == pytest.approx(0.356, abs=2e-3)
+    assert share["order"] == pytest.approx(1.0, abs=0.1)
+    assert share["error"] > 0.45
+    assert torque["limit"] == pytest.approx(66.5e-3, rel=0.01)
+    other = found["other"]
+    assert other["integrator"] == "discrete"
+    assert other["metrics"]["load.share_A"]["limit"] == pytest.approx(0.356, abs=3e-3)
+    assert {"load.share_A", "load.torque_rms.A"} <= set(found["failed"])
+
+
+def test_table_says_what_the_json_says(shell: Shell) -> None:
+    args = ("converge", "short.toml", "--alone")
+    said = shell(*args)
+    found = json.loads(shell(*args, "--json").out)
+    assert said.status == 0
+    assert (found["failed"], found["other"]) == ([], None)
+    assert set(found["metrics"]) == {
+        key for key in ABSOLUTE if key.split(".")[0] in ("tracking", "load")
+    }
+    row = next(line for line in said.out.splitlines() if "tracking RMS" in line)
+    value = found["metrics"]["tracking.rms"]["value"]
+    assert f"{1e3 * value:.4g} mm" in row
+    assert row.rstrip().endswith("pass")
+    assert "…" not in said.out
+    assert shell(*args, "--quiet").out == ""
+
+
+def test_bar_and_table_decide(shell: Shell) -> None:
+    tight = ("converge", "short.toml", "--alone", "--bar", "1e-9")
+    assert shell(*tight).status == 1
+    failed = json.loads(shell(*tight, "--json").out)["failed"]
+    allowed = [part for key in failed for part in ("--set", f"converge.{key}=1.0")]
+    assert shell(*tight, *allowed).status == 0
+    assert shell(*tight, *allowed[:-2]).status == (1 if len(failed) else 0)
+
+
+def test_what_cannot_be_tried_is_refused(shell: Shell) -> None:
+    few = shell("converge", "short.toml", "--halvings", "1")
+    assert (few.status, few.err) == (2, "fivebar: short.toml: halvings must be 2 to 6, got 1\n")
+    below = shell("converge", "short.toml", "--bar=-1")
+    assert (below.status, below.err) == (2, "fivebar: --bar must be in [0, inf) %, got -1\n")
+    key = shell("converge", "short.toml", "--set", "converge.tracking=1")
+    assert key.status == 2
+    assert "unknown key 'tracking'" in key.err
+    low = shell("converge", "short.toml", "--set", "converge.tracking.rms=[0.1,1]")
+    assert "must be a relative error in [0, inf), got [0.1, 1.0]" in low.err
+
+
+def test_run_that_breaks_down_is_named(shell: Shell, monkeypatch: pytest.MonkeyPatch) -> None:
+    executed = rollout.execute
+
+    def broken(planned: rollout.Plan) -> rollout.Result:
+        if planned.scenario.sim.integrator == "implicitfast":
+            raise DivergedError("short: it flew apart", 0.1)
+        return executed(planned)
+
+    monkeypatch.setattr(rollout, "execute", broken)
+    beside = shell("converge", "short.toml")
+    assert beside.status == 0
+    line = "fivebar: implicitfast at a timestep of 0.001 s: short: it flew apart\n"
+    assert beside.err == line
+    own = shell("converge", "short.toml", "--set", "sim.integrator=implicitfast")
+    assert (own.status, own.err) == (1, line)
