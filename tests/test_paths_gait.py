@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import msgspec
 import numpy as np
 import pytest
 from hypothesis import given
@@ -9,6 +10,7 @@ from hypothesis import strategies as st
 
 from fivebar_sim.errors import ArgumentError
 from fivebar_sim.paths import Gait
+from fivebar_sim.paths.gait import GRAVITY
 from fivebar_sim.paths.quintic import STEEPEST, arch, pieces
 
 GAIT = Gait(
@@ -103,6 +105,56 @@ def test_ramp_eases_the_stance_and_its_phase(time: float, ramp: float) -> None:
     if path.in_stance(time):
         speed = -path.at(time).velocity[0]
         assert speed == pytest.approx(path.stance_speed * s_dot, abs=1e-12)
+
+
+@given(gaits)
+def test_hip_of_a_running_gait_is_carried_by_the_stance_alone(path: Gait) -> None:
+    """Newton's law for a trunk on a massless leg: the ground pushes in stance only, by a half sine.
+
+    The push's impulse over a period is that of the weight, so the bounce repeats by itself.
+    """
+    n = 4000
+    cycle = (np.arange(n) + 0.5) / n
+    _, rate, acceleration = path.bounce(cycle)
+    push = (acceleration + GRAVITY) / GRAVITY  # in weights
+    stance = cycle < path.duty
+    half_sine = 0.5 * np.pi / path.duty * np.sin(np.pi * cycle / path.duty)
+    np.testing.assert_allclose(push[stance], half_sine[stance], atol=1e-12)
+    np.testing.assert_array_equal(push[~stance], 0.0)
+    assert push.mean() == pytest.approx(1.0, abs=1e-3)  # of a sum over a step at both ends
+
+    ends = path.bounce(np.array([0.0, path.duty, np.nextafter(path.duty, 0.0), 1.0 - 1e-15]))
+    flown = 0.5 * GRAVITY * (1.0 - path.duty) * path.period
+    np.testing.assert_allclose(ends[0], 0.0, atol=1e-9)
+    np.testing.assert_allclose(ends[1], [-flown, flown, flown, -flown], rtol=1e-9)
+    assert rate[~stance].max() <= flown
+
+
+@given(gaits)
+def test_running_foot_is_as_high_above_the_ground_as_a_walking_one(path: Gait) -> None:
+    time = over_a_period(path, 500)
+    running = msgspec.structs.replace(path, running=True)
+    bounce = running.bounce(running.cycle(time))
+    walk = path.nominal(time)
+    run = running.nominal(time)
+    for own, level, up in zip(run, walk, bounce, strict=True):
+        np.testing.assert_array_equal(own[:, 0], level[:, 0])
+        np.testing.assert_allclose(own[:, 1] + up, level[:, 1], rtol=1e-12, atol=1e-12)
+
+
+def test_rates_of_a_running_gait_are_those_of_its_place() -> None:
+    path = msgspec.structs.replace(GAIT, running=True, touchdown=0.0)
+    time = np.linspace(0.0, 2.0 * path.period, 801)
+    h = 1e-6
+    ahead = path.nominal(time + h)
+    behind = path.nominal(time + 2.0 * h)
+    now = path.nominal(time + h * 1.5)
+    np.testing.assert_allclose(
+        (behind.position - ahead.position) / h, now.velocity, rtol=0.0, atol=1e-6
+    )
+    np.testing.assert_allclose(
+        (behind.velocity - ahead.velocity) / h, now.acceleration, rtol=0.0, atol=1e-3
+    )
 
 
 # edge

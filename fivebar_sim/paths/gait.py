@@ -10,6 +10,9 @@ from fivebar_sim.checks import check_number
 from fivebar_sim.paths.base import FARTHEST, Cyclic, Pair, Sample, check_pair, ease, times
 from fivebar_sim.paths.quintic import STEEPEST, arch, pieces
 
+GRAVITY = 9.81
+"""What a running gait's hip falls with [m/s^2]."""
+
 
 class Gait(Cyclic, frozen=True, tag="gait"):
     """Stance and swing of one leg, in the hip frame, starting in the middle of the stance.
@@ -30,6 +33,8 @@ class Gait(Cyclic, frozen=True, tag="gait"):
         lift: Height of the swing above the ground [m].
         duty: Duty factor: the fraction of a period that is stance, in (0, 1).
         touchdown: Downward speed of the foot at the end of the swing [m/s].
+        running: Whether the hip flies while the foot swings, as it must where no other leg carries
+            it; see `bounce`. In a walk the hip stays level.
     """
 
     centre: Pair
@@ -37,6 +42,7 @@ class Gait(Cyclic, frozen=True, tag="gait"):
     lift: float
     duty: float = 0.5
     touchdown: float = 0.0
+    running: bool = False
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -93,7 +99,8 @@ class Gait(Cyclic, frozen=True, tag="gait"):
         Position, velocity and acceleration are continuous, within and between the pieces, with one
         exception: at touch-down z' jumps from -touchdown to 0, since the ground stops the foot; the
         value at that instant is 0. The foot overshoots the stance line at both ends of the swing,
-        where it must turn round.
+        where it must turn round. If `running`, z is lower by the height of the hip, see `bounce`:
+        the foot's height above the ground stays as it is here.
         """
         cycle = self._cycle(self._times(time))
         duty = self.duty
@@ -109,11 +116,46 @@ class Gait(Cyclic, frozen=True, tag="gait"):
         dx = np.where(stands, slope, dx)
         ddx = np.where(stands, 0.0, ddx)
 
-        return Sample(
-            position=np.stack([x, z], axis=-1),
-            velocity=self.frequency * np.stack([dx, dz], axis=-1),
-            acceleration=self.frequency**2 * np.stack([ddx, ddz], axis=-1),
-        )
+        position = np.stack([x, z], axis=-1)
+        velocity = self.frequency * np.stack([dx, dz], axis=-1)
+        acceleration = self.frequency**2 * np.stack([ddx, ddz], axis=-1)
+        if not self.running:
+            return Sample(position, velocity, acceleration)
+
+        # In the frame of a hip that rises, the foot falls.
+        up, up_dot, up_ddot = self.bounce(cycle)
+        position[..., 1] -= up
+        velocity[..., 1] -= up_dot
+        acceleration[..., 1] -= up_ddot
+        return Sample(position, velocity, acceleration)
+
+    def bounce(self, cycle: Array) -> tuple[Array, Array, Array]:
+        """Return how far a running leg's hip is above where it touches down, and its two rates.
+
+        In swing the hip flies. In stance the ground pushes it by a half sine, as the foot force of
+        kind "stance" does; the push's mean over a period is the weight. With c the cycle:
+
+            swing    h'' = -GRAVITY
+            stance   h'' = GRAVITY (pi / (2 duty) sin(pi c / duty) - 1)
+
+        Args:
+            cycle: Of `cycle`, in [0, 1), shape (...).
+
+        Returns:
+            h [m], h' [m/s] and h'' [m/s^2], each (...). All are continuous; h = 0 at touch-down and
+            lift-off.
+        """
+        duty = self.duty
+        stands = cycle < duty
+        span = np.where(stands, duty, 1.0 - duty) * self.period
+        t = np.where(stands, cycle, cycle - duty) * self.period
+        push = np.where(stands, 0.5 * GRAVITY / duty, 0.0)
+        turn = np.pi * t / span
+
+        up = 0.5 * GRAVITY * t * (span - t) - push * span**2 / np.pi * np.sin(turn)
+        up_dot = 0.5 * GRAVITY * (span - 2.0 * t) - push * span * np.cos(turn)
+        up_ddot = push * np.pi * np.sin(turn) - GRAVITY
+        return up, up_dot, up_ddot
 
     def _cycle(self, time: Array) -> Array:
         # Half a stance after touch-down at t = 0: the ramp from rest begins on the ground.
