@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from shell import ELLIPSE
+from shell import JUDGED
 
 from fivebar_sim import __version__
 
@@ -19,7 +19,7 @@ FIVEBAR = str(Path(sys.executable).with_name("fivebar"))
 @pytest.fixture
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.chdir(tmp_path)
-    (tmp_path / "short.toml").write_text(ELLIPSE, encoding="utf-8")
+    (tmp_path / "short.toml").write_text(JUDGED, encoding="utf-8")
     return tmp_path
 
 

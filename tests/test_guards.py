@@ -309,7 +309,7 @@ def test_new_guard_is_a_row_and_a_function(shell: Shell, monkeypatch: pytest.Mon
     depth = json.loads(Path("run/metrics.json").read_text())["guards"][-1]["value"]
     assert shell("report", "run").status == 0
     page = Path("run/report.html").read_text()
-    assert "&lt;= 10 mm" in page
+    assert "depth: foot below 10 mm" in page
     assert f"{1e3 * depth:.4g} mm" in page
     assert shell("check", "short.toml", "--junit", "junit.xml").status == 1
     assert words in Path("junit.xml").read_text()

@@ -93,12 +93,17 @@ class Guard(Table, frozen=True):
         if self.ok != (self.time is None):
             raise ValueError(f"ok must be {str(not self.ok).lower()} with time {self.time}")
 
+    @property
+    def bound(self) -> str:
+        """What must not happen, in words, of the part that tripped it or of any part of the leg."""
+        row = ROWS[self.name]
+        return row.what.format(row.scale * self.high, part=self.part or "leg")
+
     def __str__(self) -> str:
         """Return the message of a guard that tripped: the bound, when, and the worst value."""
         row = ROWS[self.name]
-        bound = row.what.format(row.scale * self.high, part=self.part)
         worst = row.worst.format(row.scale * (self.value or 0.0))
-        return f"guard {self.name}: {bound} at t = {self.time:g} s{worst}"
+        return f"guard {self.name}: {self.bound} at t = {self.time:g} s{worst}"
 
 
 class Evidence(NamedTuple):

@@ -94,10 +94,9 @@ def _guards(run: StoredRun) -> str:
 
     for guard in guarded:
         row = guards.ROWS[guard.name]
-        because = row.what.format(row.scale * guard.high)
         # An undefined value is none, where the row would show a 0.
         worst = "undefined" if guard.value is None else row.show(guard.value)
-        rows.append((f"{row.name}: {because}", worst, html.verdict(guard.ok)))
+        rows.append((f"{row.name}: {guard.bound}", worst, html.verdict(guard.ok)))
 
     said = f"Guards: all {len(guarded)} hold"
     if lost:
