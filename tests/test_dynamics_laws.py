@@ -14,7 +14,7 @@ from poses import sample
 from fivebar_sim import dynamics, kinematics, model, motion
 from fivebar_sim.arrays import Array
 from fivebar_sim.errors import ArgumentError, DivergedError
-from fivebar_sim.geometry import FiveBar
+from fivebar_sim.geometry import HEAVIEST, FiveBar
 from fivebar_sim.integrator import pull
 from fivebar_sim.paths import Ellipse
 
@@ -145,6 +145,26 @@ def test_payload_is_a_point_of_L2s_own_mass(payload: float) -> None:
         assert np.abs(ask(PLAIN, 0.0) - truth).max() > 1e-3 * np.abs(truth).max()
 
 
+def test_foot_force_of_time_pose_and_rates_is_its_torques_at_the_motors() -> None:
+    """The torques J^T F, of a damper on the motors' rates that stiffens with time and angle."""
+    theta = kinematics.home(PLAIN)[::2]
+    start = (theta, (3.0, -2.0))
+
+    def force(t: float, q: Array, w: Array) -> Array:
+        return -(1.0 + 50.0 * t + q[..., :1]) * w
+
+    def torque(t: float, q: Array, w: Array) -> Array:
+        return -dynamics.statics(PLAIN, q, force(t, q, w))
+
+    for move in (
+        lambda **laws: dynamics.simulate(PLAIN, *start, H, 20, **laws),
+        lambda **laws: dynamics.integrate(PLAIN, *start, (0.0, 0.01, 0.02), **laws),
+    ):
+        pushed = move(foot_force=force).theta
+        np.testing.assert_allclose(pushed, move(torque=torque).theta, rtol=0, atol=1e-11)
+        assert np.abs(pushed - move().theta).max() > 1e-3
+
+
 @pytest.mark.parametrize("damping", [0.0, 0.05])
 @pytest.mark.parametrize("leg", [CLASSIC, replace(HEAVY, tilt=0.2)], ids=["classic", "heavy"])
 def test_gap_of_a_soft_loop_obeys_its_equation(leg: FiveBar, damping: float) -> None:
@@ -246,7 +266,37 @@ def test_law_without_a_number_at_the_start_ends_the_motion_there() -> None:
     assert info.value.time == 3.0
 
 
+@pytest.mark.parametrize("half", [(np.nan, 0.0), (0.0, np.nan)])
+def test_law_with_one_number_that_is_none_ends_the_motion(half: tuple[float, float]) -> None:
+    theta = kinematics.home(CLASSIC)[::2]
+    for move in (
+        lambda **law: dynamics.simulate(CLASSIC, theta, (0.0, 0.0), H, 3, **law),
+        lambda **law: dynamics.integrate(CLASSIC, theta, (0.0, 0.0), (0.0, 1.0), **law),
+    ):
+        for name in ("torque", "foot_force"):
+            with pytest.raises(DivergedError, match=f"at t = 0 s: {name} is not finite"):
+                move(**{name: lambda t, q, w: half})
+
+
 # refusal
+
+
+def test_payload_up_to_the_heaviest_mass_is_taken() -> None:
+    theta = kinematics.home(CLASSIC)[::2]
+    assert np.isfinite(dynamics.mass_matrix(CLASSIC, theta, payload=HEAVIEST)).all()
+    with pytest.raises(ArgumentError, match=r"payload must be in \[0, 1e\+06\] kg, got 1000001\.0"):
+        dynamics.mass_matrix(CLASSIC, theta, payload=HEAVIEST + 1.0)
+
+
+def test_state_of_the_wrong_shape_is_named() -> None:
+    pair = (0.0, 0.0)
+    triple = (0.0, 0.0, 0.0)
+    for name, state in (("theta", (triple, pair)), ("theta_dot", (pair, triple))):
+        said = rf"^{name} must have shape \(..., 2\), got \(3,\)"
+        with pytest.raises(ArgumentError, match=said):
+            dynamics.simulate(CLASSIC, *state, H, 3)
+        with pytest.raises(ArgumentError, match=said):
+            dynamics.integrate(CLASSIC, *state, (0.0, 1.0))
 
 
 def test_steps_without_finite_accelerations_are_refused_without_a_warning() -> None:
