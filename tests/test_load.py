@@ -320,3 +320,19 @@ def test_moving_share_leaves_out_what_is_nothing_beside_the_largest() -> None:
 
     assert [*loaded] == [True, False, True]
     assert [*share] == [0.0, 0.75]
+
+
+@pytest.mark.parametrize("size", [1e-6, 1e6])
+def test_moving_share_knows_nothing_by_its_part_of_the_largest(size: float) -> None:
+    rows = size * np.array([[1.0, 1.0], [0.5 * load.TINY, 0.0], [2.0 * load.TINY, 0.0]])
+    share, loaded = load.moving_share(rows, 0)
+
+    assert [*loaded] == [True, False, True]
+    assert [*share] == [0.5, 1.0]
+
+
+def test_moving_share_without_any_torque_is_of_no_row() -> None:
+    share, loaded = load.moving_share(np.zeros((3, 2)), 1)
+
+    assert share.shape == (0,)
+    assert not loaded.any()
