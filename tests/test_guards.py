@@ -249,6 +249,9 @@ def test_chatter_is_up_and_down_with_every_command_and_lasts(rng: np.random.Gene
     assert most(load + 0.02 * turning) == 0.0  # too faint
     assert 0.5 < most(np.repeat(rng.standard_normal(300), 10)) < 0.8  # noise alone is none either
     assert most(load) == 0.0
+    loud = load + turning
+    loud[1500] += 30.0  # a spike of a single step hides nothing
+    assert most(loud) == 1.0
 
 
 def test_bounds_are_in_parts_of_the_leg() -> None:

@@ -12,8 +12,8 @@ from fivebar_sim.metrics.columns import motors
 WITHIN = 1.0
 """Clipped and chattering steps are counted over this time [s], or over a shorter run."""
 
-FAINT = 0.1
-"""Changes of torque up to this part of the run's largest are too faint to be chatter."""
+FAINT = 0.2
+"""Changes of torque up to this part of the last second's RMS are too faint to be chatter."""
 
 
 def clipped(saturated: Bools, time: Array) -> Array:
@@ -35,21 +35,25 @@ def chattering(record: Mapping[str, Array], command: int) -> Array:
     """Return, for each step, the part of the last second in which the worse motor chattered, (N,).
 
     A step chatters if the torque goes up with one command and down with the next, by more than
-    `FAINT` of the run's largest: d = tau_k - tau_k-P has the other sign P steps before, with P the
-    steps of a command.
+    `FAINT` of both motors' RMS in the last second: d = tau_k - tau_k-P has the other sign P steps
+    before, with P the steps of a command.
 
     Args:
         record: The columns of rollout.parquet.
         command: P.
     """
     torque = motors(record, "torque")
+    window = _window(record["time"])
+    # An RMS, as a single spike must not make all else look faint.
+    steps = np.minimum(np.arange(1, len(torque) + 1), window)
+    squares = _sums(torque**2, window).mean(axis=1, keepdims=True) / steps[:, None]
+    loud = FAINT * np.sqrt(np.maximum(squares, 0.0))
     # Whole commands apart: within a command a torque may ring without any chatter.
     d = np.zeros_like(torque)
     d[command:] = torque[command:] - torque[:-command]
-    d[np.abs(d) <= FAINT * np.abs(torque).max()] = 0.0
+    d[np.abs(d) <= loud] = 0.0
     chatters = np.zeros(torque.shape, dtype=bool)
     chatters[command:] = d[command:] * d[:-command] < 0.0
-    window = _window(record["time"])
     return _sums(chatters, window).max(axis=1) / window
 
 
@@ -58,7 +62,7 @@ def _window(time: Array) -> int:
     return min(max(1, round(WITHIN / float(time[0]))), len(time))
 
 
-def _sums(values: Bools, window: int) -> Array:
+def _sums(values: Bools | Array, window: int) -> Array:
     """Return the sums over the steps of a window that ends with each step, (N, 2)."""
     # Differences of running sums: the cost does not depend on the window's width.
     so_far: Array = np.concatenate([np.zeros((1, 2)), np.cumsum(values, axis=0, dtype=float)])
