@@ -27,8 +27,8 @@ from fivebar_sim.metrics.columns import JOINT_COLUMNS, MOTOR_JOINTS, RATE_COLUMN
 from fivebar_sim.metrics.ground import contact_radius
 from fivebar_sim.metrics.json_types import Amount, Number, Table
 
-TINY = 1e-9
-"""Energy turned over up to which the imbalance is undefined [J]: the leg only stands."""
+STILL = 1e-8
+"""Angle that no joint turns by in a leg that only stands [rad]; its balance would be rounding."""
 
 
 class Body(NamedTuple):
@@ -43,6 +43,11 @@ class Body(NamedTuple):
     leg: FiveBar
     payload: float
     trunk: float
+
+    @property
+    def mass(self) -> float:
+        """All of it [kg]."""
+        return self.trunk + self.payload + sum(link.mass for link in self.leg.links)
 
 
 class Steps(NamedTuple):
@@ -72,6 +77,8 @@ class Balance(NamedTuple):
         step: Energy that MuJoCo's step gave by taking centripetal torques at its start.
         kinetic: Gain of kinetic energy.
         potential: Gain of potential energy.
+        moved: Whether the leg moved at all; see `STILL`.
+        lift: Energy that lifts all that moves by the leg's size, not of a step [J].
     """
 
     motor: Array
@@ -81,6 +88,8 @@ class Balance(NamedTuple):
     step: Array
     kinetic: Array
     potential: Array
+    moved: bool
+    lift: float
 
     @property
     def turnover(self) -> float:
@@ -103,8 +112,8 @@ class Balance(NamedTuple):
 
     @property
     def imbalance(self) -> float | None:
-        """Largest |unaccounted| / turnover; None where next to nothing was turned over."""
-        if not self.turnover > TINY:
+        """Largest |unaccounted| / turnover; None where the leg only stood."""
+        if not (self.moved and self.turnover > 0.0):
             return None
         return float(np.abs(self.unaccounted).max()) / self.turnover
 
@@ -156,6 +165,12 @@ class _Motion(NamedTuple):
             hip_dot = _begun(0.0, record["hip_dot_z"])
         return cls(q, v, hip, hip_dot, 0.5 * (v[1:] + v[:-1]), 0.5 * (hip_dot[1:] + hip_dot[:-1]))
 
+    def turned(self, leg: FiveBar) -> bool:
+        """Return whether a joint turned by more than `STILL`, or the hip rose by as much."""
+        # A part of the leg's size for the hip: the rule is the same for legs of any size.
+        most = max(float(np.ptp(self.q, axis=0).max()), float(np.ptp(self.hip)) / leg.size)
+        return most > STILL
+
 
 def balance(body: Body, record: Mapping[str, Array], steps: Steps) -> Balance:
     """Return the works of every step, and what the energies gained.
@@ -194,6 +209,8 @@ def balance(body: Body, record: Mapping[str, Array], steps: Steps) -> Balance:
         step=h * _given_away(body, m),
         kinetic=np.diff(kinetic),
         potential=np.diff(potential),
+        moved=m.turned(leg),
+        lift=body.mass * float(np.hypot(*leg.gravity)) * leg.size,
     )
 
 
@@ -236,12 +253,11 @@ def mechanical(
     p = _open_pose(q)
     w = _of_links(v)
     kinetic, potential = chain.energies(p, w)
-    mass = body.trunk + body.payload + sum(link.mass for link in body.leg.links)
     momentum = sum(r[0] * rate for r, rate in zip(chain.moments(p), w, strict=True))
     gravity = body.leg.gravity[1]
     return (
-        kinetic + hip_dot * (momentum + 0.5 * mass * hip_dot),
-        potential - mass * gravity * hip,
+        kinetic + hip_dot * (momentum + 0.5 * body.mass * hip_dot),
+        potential - body.mass * gravity * hip,
     )
 
 
@@ -267,7 +283,8 @@ def measure(found: Balance) -> Energy:
 
     The net works and gains of `Balance` [J], and its turnover and imbalance.
     """
-    net = {name: float(work.sum()) for name, work in found._asdict().items()}
+    works = ("motor", "force", "ground", "constraints", "step", "kinetic", "potential")
+    net = {name: float(getattr(found, name).sum()) for name in works}
     return Energy(**net, turnover=found.turnover, imbalance=found.imbalance)
 
 

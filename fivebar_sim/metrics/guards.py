@@ -42,9 +42,10 @@ class Guards(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
         chatter: Largest part of any second, or of a shorter run, in which a motor's torque may go
             up and down with every command.
         energy: Largest imbalance of the energy, as a part of the energy turned over.
-        constraints: Largest energy that loop, gear friction and ends of travel may give, as the
-            same part.
-        step: Largest energy that MuJoCo's steps may give or take by themselves, as the same part.
+        constraints: Largest energy that loop, gear friction and ends of travel may give, as a part
+            of the energy turned over and of that which lifts all that moves by the leg's size.
+        step: Largest energy that MuJoCo's steps may give or take by themselves, as a part of the
+            energy turned over.
         floor: Largest depth of a joint or the trunk in the floor, as a part of the leg's size.
         stops: Largest angle by which a joint may lean into a stop [rad]; above 0 the stop pushes.
     """
@@ -205,7 +206,8 @@ def _unaccounted_energy(run: Evidence) -> Found:
 
 def _giving_constraints(run: Evidence) -> Found:
     # Loop, friction and ends of travel can only take energy; giving some is an artefact.
-    return _part(run, run.balance.given, run.bounds.constraints)
+    # A loaded leg that hardly moves turns next to nothing over, but its weight is at stake.
+    return _part(run, run.balance.given, run.bounds.constraints, run.balance.lift)
 
 
 def _giving_steps(run: Evidence) -> Found:
@@ -258,13 +260,13 @@ def _first(chosen: Bools, time: Array) -> float | None:
     return float(time[np.argmax(chosen)]) if chosen.any() else None
 
 
-def _part(run: Evidence, energy: Array, high: float) -> Found:
-    """Return the largest |energy so far|, as a part of the energy turned over in the run."""
+def _part(run: Evidence, energy: Array, high: float, more: float = 0.0) -> Found:
+    """Return the largest |energy so far|, as a part of the energy turned over, and of `more`."""
     balance = run.balance
     # A leg that only stands turns nothing over: every part of it would be rounding.
     if balance.imbalance is None:
         return Found(None, high, None)
-    return _highest(run, np.abs(energy) / balance.turnover, high)
+    return _highest(run, np.abs(energy) / (balance.turnover + more), high)
 
 
 GUARDS = (
@@ -304,7 +306,7 @@ GUARDS = (
     Row(
         "constraints",
         _giving_constraints,
-        "loop, gears or ends of travel had given more than {:.3g} % of the energy turned over",
+        "loop, gears or ends of travel had given more than {:.3g} % of the energy at stake",
         ", {:.3g} % at worst",
         1e2,
         "%",
