@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import subprocess
 import sys
 from collections.abc import Callable
@@ -181,6 +182,23 @@ def test_setpoints_of_wrong_shape_or_not_finite_are_refused(
         "controller 'wrong' must plan finite setpoints [rad] of shape (800, 2)"
     )
     assert came in message
+
+
+@pytest.mark.parametrize("integrator", ["discrete", "implicitfast"])
+def test_torque_that_would_need_a_setpoint_turns_away_is_refused(integrator: str) -> None:
+    """500 kg at the foot: tau / kp is 15 to 20 rad, and the run passed as if a servo took that."""
+    heavy = ("controller.feedforward=torque", f"sim.integrator={integrator}")
+    said = refused(*heavy, "scene={kind='payload', mass=500}")
+    assert said.startswith(
+        "controller 'servo' must plan setpoints within 3.142 rad (half a turn) of the motors' "
+        "angles, got one for E that is "
+    )
+    assert float(re.findall(r"that is (\S+) rad away at t = 0 s; ", said)[0]) > 14.0
+    assert said.endswith("is servo.kp = 8 N m/rad too soft for the load?")
+    stiff = [*heavy, "scene={kind='payload', mass=500}", "servo.kp=80"]
+    plan = rollout.plan(Scenario.load("classic-ellipse", stiff))
+    assert plan.setpoints is not None
+    assert 1.5 < np.abs(plan.setpoints - plan.motion.q[1:, ::2]).max() < np.pi
 
 
 @pytest.mark.parametrize(

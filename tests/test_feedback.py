@@ -78,11 +78,12 @@ class Angles(msgspec.Struct, frozen=True, kw_only=True):
 
     drive: ClassVar[Drive] = "position"
     period: float = 0.001
+    turned: float = 0.0
 
     def command(self, leg: FiveBar, servo: Servo, seen: Observation, wanted: Reference) -> Array:
-        """Return the reference's angles."""
-        del leg, servo, seen
-        return wanted.theta
+        """Return the reference's angles, those of E turned from 0.1 s on."""
+        del leg, servo
+        return wanted.theta + np.array([0.0, self.turned if seen.time > 0.0995 else 0.0])
 
 
 def with_mine(controller: Any, *settings: str) -> Plan:
@@ -263,6 +264,13 @@ def test_controller_without_an_answer_at_the_start() -> None:
     with pytest.raises(DivergedError, match="has no answer: its command is not finite") as caught:
         rollout.execute(with_mine(Mine(wrong="nan", after=0.0)))
     assert caught.value.time == 0.0
+
+
+def test_setpoint_that_no_servo_can_mean_says_when_and_whose() -> None:
+    with pytest.raises(DivergedError, match=r"for E that is 3\.\d* rad away") as caught:
+        rollout.execute(with_mine(Angles(turned=3.3)))
+    assert "must be within 3.142 rad (half a turn) of the motors' angles" in str(caught.value)
+    assert caught.value.time == pytest.approx(0.1)
 
 
 @pytest.mark.parametrize("settings", [["controller.kd=10"], ["controller.kp=1000"]])

@@ -24,6 +24,10 @@ from fivebar_sim.integrator import Integrator
 Drive = Literal["position", "torque"]
 """What a command is: an angle for the servo [rad], or a torque for the bare motor [N m]."""
 
+FARTHEST = float(np.pi)
+"""Farthest that a setpoint means from the servo's angle [rad]: half a turn, beyond which another
+way round is shorter."""
+
 
 class Servo(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """The servo at each motor: ideal without `speed`, with it a DC motor.

@@ -10,6 +10,7 @@ import numpy as np
 from fivebar_sim.arrays import Array
 from fivebar_sim.control import Feedback, Reference
 from fivebar_sim.control.interface import answer_of, is_numbers
+from fivebar_sim.control.servo import FARTHEST
 from fivebar_sim.control.step import ControlStep
 from fivebar_sim.errors import ConfigError, DivergedError, PoseError
 from fivebar_sim.motion import Motion
@@ -140,7 +141,7 @@ def _command(group: _Group, k: int) -> Array:
     """Return what a controller commands at step k, checked, (nsim, 2).
 
     Raises:
-        PoseError: It has no answer in a pose, or one that is not finite.
+        PoseError: It has no answer in a pose, or one that is not finite or no setpoint.
         ConfigError: It fails otherwise, or answers with another shape.
     """
     s = group.plan.scenario
@@ -160,4 +161,23 @@ def _command(group: _Group, k: int) -> Array:
         bad = ~np.isfinite(command).all(axis=1)
         raise PoseError("its command is not finite", (int(np.argmax(bad)),))
 
+    if group.controller.drive == "position":
+        _check_near(command, seen.theta)
     return command
+
+
+def _check_near(command: Array, theta: Array) -> None:
+    """Raise if a setpoint is farther from the angle that is seen than a servo can mean.
+
+    Raises:
+        PoseError: Says of which motor, and how far.
+    """
+    away = np.abs(command - theta)
+    row, motor = np.unravel_index(int(np.argmax(away)), away.shape)
+    name = "AE"[motor]
+    if not away[row, motor] <= FARTHEST:
+        raise PoseError(
+            f"its setpoints must be within {FARTHEST:.4g} rad (half a turn) of the motors' angles, "
+            f"got one for {name} that is {away[row, motor]:.4g} rad away",
+            (int(row),),
+        )

@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple, cast
+from typing import Any, NamedTuple, cast
 
 import mujoco
 import numpy as np
+from numpy.typing import NDArray
 
 from fivebar_sim import model, motion
 from fivebar_sim.arrays import Array
 from fivebar_sim.control import Feedback, Setpoints
 from fivebar_sim.control.bus import Bus
 from fivebar_sim.control.interface import answer_of, is_numbers
+from fivebar_sim.control.servo import FARTHEST
 from fivebar_sim.control.step import check_whole_steps, whole_steps
 from fivebar_sim.errors import ConfigError
+from fivebar_sim.metrics.columns import MOTOR_JOINTS, MOTORS
 from fivebar_sim.motion import Motion
 from fivebar_sim.scenario import Scenario
 from fivebar_sim.scenario.scenes import Ground, Payload
@@ -54,8 +57,9 @@ def plan(scenario: Scenario) -> Plan:
 
     Raises:
         UnreachableError: The path leaves the leg's workspace; says when and where.
-        ConfigError: A controller that plans setpoints of the wrong shape or not finite, a control
-            period that is not a whole number of timesteps, or servos that cannot hold the leg.
+        ConfigError: A controller that plans setpoints of the wrong shape, not finite, or more than
+            half a turn from the motors' angles, a control period that is not a whole number of
+            timesteps, or servos that cannot hold the leg.
         GeometryError: A leg that cannot stand on the scene's ground.
     """
     sim = scenario.sim
@@ -128,10 +132,33 @@ def _setpoints(scenario: Scenario, controller: Setpoints, wanted: Motion) -> Arr
             f"got {ctrl.dtype} of shape {ctrl.shape}"
         )
 
+    _check_near(scenario, ctrl, wanted)
     bus = Bus([scenario.servo], "position", timestep=scenario.sim.timestep, steps=scenario.steps)
     # Until the first setpoint arrives the servos hold the start pose.
     bus.restart(np.arange(1), wanted.q[:1, ::2])
     return bus.send_all(ctrl[None].astype(np.float64))[0]
+
+
+def _check_near(scenario: Scenario, ctrl: NDArray[Any], wanted: Motion) -> None:
+    """Raise if a setpoint is farther from the planned angle than a servo can mean.
+
+    A torque feedforward puts tau / kp into the setpoint: an angle that no servo would be sent.
+
+    Raises:
+        ConfigError: Says which motor's, how far, and when.
+    """
+    away = np.abs(ctrl - wanted.q[1:, MOTOR_JOINTS])
+    far = away.max(axis=1) > FARTHEST
+    if far.any():
+        k = int(np.argmax(far))
+        motor = int(np.argmax(away[k]))
+        name = scenario.controller_name
+        raise ConfigError(
+            f"controller {name!r} must plan setpoints within {FARTHEST:.4g} rad (half a turn) of "
+            f"the motors' angles, got one for {MOTORS[motor]} that is {away[k, motor]:.4g} rad "
+            f"away at t = {wanted.time[k]:g} s; is servo.kp = {scenario.servo.kp:g} N m/rad too "
+            "soft for the load?"
+        )
 
 
 def check_period(plan: Plan) -> None:
