@@ -80,7 +80,8 @@ def standing(record: Record) -> Record:
     t = record["time"]
     force = np.maximum(-np.sin(10.0 * t), 0.0)
     record = record | {"hip_z": 0.1 + 0.01 * np.cos(10.0 * t), "hip_dot_z": -0.1 * np.sin(10.0 * t)}
-    return record | {"ground_x": -2.0 * force, "ground_z": 5.0 * force, "belt_x": -0.3 * t}
+    record = record | {"ground_x": -2.0 * force, "ground_z": 5.0 * force, "rail_end": 0.0 * t}
+    return record | {"belt_x": -0.3 * t}
 
 
 def read(path: Path) -> tuple[dict[str, Columns], dict[str, Columns]]:

@@ -12,6 +12,7 @@ from fivebar_sim import kinematics, rollout
 from fivebar_sim.arrays import Array
 from fivebar_sim.geometry import FiveBar
 from fivebar_sim.metrics import ground
+from fivebar_sim.paths import Gait
 from fivebar_sim.rollout import Plan, Result
 from fivebar_sim.scenario import Scenario
 
@@ -49,7 +50,7 @@ def states(plan: Plan, result: Result) -> tuple[Array, Array]:
 def a_record(**columns: Array) -> dict[str, Array]:
     rows = len(next(iter(columns.values())))
     zero = np.zeros(rows)
-    names = ("foot_x", "foot_z", "theta_A", "theta_B", "hip_z", "ground_x", "ground_z")
+    names = ("foot_x", "foot_z", "theta_A", "theta_B", "hip_z", "ground_x", "ground_z", "rail_end")
     time: Array = H * np.arange(1.0, rows + 1)
     return {"time": time, **dict.fromkeys(names, zero), **columns}
 
@@ -231,3 +232,75 @@ def test_next_to_no_friction_gives_next_to_no_force() -> None:
     record = result.record
     assert np.abs(record["ground_x"]).max() < 1e-3 * record["ground_z"].max()
     assert record["ground_z"][-1] == pytest.approx(weight(LEG, 0.5), rel=1e-3)
+
+
+# the rail's end
+
+
+BELOW_STANCE = ("scene={kind='rail', drop=1e-3, stop=0.0765}", *HOLD, "duration=0.5")
+"""Foot and rail's end share the weight: the floor gives way by more than the end lies below."""
+
+
+@pytest.mark.parametrize("integrator", INTEGRATORS)
+def test_force_of_the_rails_end_is_mujocos(integrator: str) -> None:
+    """In every step, to the bit that it is a difference: the limit's own force on the slide."""
+    plan, result = done(*BELOW_STANCE, f"sim.integrator={integrator}")
+    assert plan.ctrl.shape[1] == 2
+    data = mujoco.MjData(plan.model)
+    data.qpos[:] = plan.start
+    slide = plan.model.joint("hip_z").id
+    own = np.zeros(len(plan.ctrl))
+    for k, ctrl in enumerate(plan.ctrl):
+        data.ctrl[:] = ctrl
+        mujoco.mj_step(plan.model, data)
+        limit = data.efc_type == mujoco.mjtConstraint.mjCNSTR_LIMIT_JOINT
+        own[k] = data.efc_force[limit & (data.efc_id == slide)].sum()
+    recorded = result.record["rail_end"]
+    assert own.max() > 0.1 * weight(LEG, 0.5)
+    np.testing.assert_allclose(recorded, own, rtol=0.0, atol=1e-10)
+    np.testing.assert_array_equal(recorded[own == 0.0], 0.0)
+
+
+def test_foot_and_rails_end_carry_the_weight_together() -> None:
+    _, result = done(*BELOW_STANCE)
+    record = result.record
+    held = record["ground_z"][-1] + record["rail_end"][-1]
+    assert held == pytest.approx(weight(LEG, 0.5), rel=1e-5)
+    table = result.metrics["ground"]
+    window = result.scenario.window
+    foot = record["ground_z"][window].mean()
+    rail = record["rail_end"][window].mean()
+    assert rail > 0.1 * weight(LEG, 0.5)
+    assert table["foot_share"] == pytest.approx(foot / (foot + rail), rel=1e-12)
+    assert table["rail_end_max"] == record["rail_end"].max()
+
+
+def test_rail_without_an_end_carries_nothing() -> None:
+    _, result = done("scene={kind='rail', drop=1e-3}", *HOLD, "duration=0.3")
+    np.testing.assert_array_equal(result.record["rail_end"], 0.0)
+    assert result.metrics["ground"]["foot_share"] == 1.0
+    assert result.metrics["ground"]["rail_end_max"] == 0.0
+    assert ground.foot_share(LEG, a_record(foot_z=np.ones(5)), slice(0, 5)) is None
+
+
+@pytest.mark.parametrize("name", ["treadmill-trot", "minitaur-treadmill"])
+def test_foot_of_a_gait_carries_the_weight_over_whole_strides(name: str) -> None:
+    """The mean force of the ground over whole strides is the weight of trunk and leg."""
+    scenario = Scenario.load(name)
+    result = rollout.run(scenario)
+    path = scenario.path
+    assert isinstance(path, Gait)
+    stride = round(path.period / scenario.sim.timestep)
+    assert stride * scenario.sim.timestep == pytest.approx(path.period, rel=1e-9)
+    force = result.record["ground_z"][scenario.window]
+    force = force[: len(force) // stride * stride]
+    leg = scenario.leg
+    assert force.mean() == pytest.approx(weight(leg, scenario.trunk), rel=0.01)
+    np.testing.assert_array_equal(result.record["rail_end"], 0.0)
+
+    # In the middle of the swing the foot is clear of the belt, by half of the lift at least.
+    cycle = path.cycle(result.record["time"])
+    duty = path.duty
+    middle = np.abs(cycle - 0.5 * (1.0 + duty)) < 0.1 * (1.0 - duty)
+    clear = ground.height(leg, result.record)[middle]
+    assert clear.min() > 0.5 * path.lift

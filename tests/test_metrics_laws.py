@@ -52,7 +52,8 @@ def on_floor(record: dict[str, Array], down: Array) -> dict[str, Array]:
     """Return a record of a leg on a rail that is carried in some steps, by 5 N."""
     still = np.zeros(len(down))
     lifted = {"hip_z": 0.07 + still, "hip_dot_z": 0.1 + still}
-    return {**record, **lifted, "ground_x": 0.1 * down, "ground_z": 5.0 * down}
+    carried = {"ground_x": 0.1 * down, "ground_z": 5.0 * down, "rail_end": still}
+    return {**record, **lifted, **carried}
 
 
 def besides(record: dict[str, Array], saturated: Bools | None = None) -> measure.Unrecorded:
@@ -148,7 +149,8 @@ def test_ground_says_when_the_foot_stood(rng: np.random.Generator) -> None:
     for scenario in (STEPS, ELLIPSE):
         found = measured(scenario, record)
         window = scenario.window
-        assert found["ground"] == msgspec.to_builtins(ground.measure(scenario.leg, record, window))
+        whole = msgspec.to_builtins(ground.measure(scenario.leg, record, window))
+        assert found["ground"] == {**whole, "foot_share": 1.0, "rail_end_max": 0.0}
         torque = motors(record, "torque")[window][down[window]]
         rms = np.sqrt(np.mean(torque**2, axis=0))
         for motor, value in zip("AE", rms.tolist(), strict=True):

@@ -27,7 +27,7 @@ COLUMNS = (
     "theta_dot_E theta_dot_D ctrl_A ctrl_E torque_A torque_E gap"
 ).split()
 HIP = ["hip_z", "hip_dot_z"]
-GROUND = ["ground_x", "ground_z"]
+GROUND = ["ground_x", "ground_z", "rail_end"]
 GAIT = "path={kind='gait', centre=[0, -0.07], stride=0.02, lift=0.01, frequency=4, ramp=0.1}"
 SCENES = {
     "air": ["scene=air"],

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 from fivebar_sim.arrays import Array
 from fivebar_sim.geometry import FiveBar
-from fivebar_sim.metrics import closure, tracking
+from fivebar_sim.metrics import closure, ground, tracking
 
 Function = Callable[[FiveBar, Mapping[str, Array], slice], float | None]
 """Takes the leg, the record and the rows of the measured window; None is undefined."""
@@ -132,6 +132,26 @@ CATALOGUE = (
     Metric("ground.slip", "slip in stance", 1e3, "mm", tolerance=1e-6, less_is_better=True),
     Metric("ground.foot_height_max", "foot height max", 1e3, "mm", tolerance=1e-6),
     Metric("ground.flight_max", "longest flight", 1e3, "ms", tolerance=2e-3),
+    Metric(
+        key="ground.foot_share",
+        label="weight on the foot",
+        scale=1e2,
+        unit="%",
+        tolerance=2e-3,
+        function=ground.foot_share,
+        low=0.0,
+    ),
+    Metric(
+        key="ground.rail_end_max",
+        label="force of the rail's end max",
+        scale=1.0,
+        unit="N",
+        tolerance=1e-3,
+        less_is_better=True,
+        hidden_at_zero=True,
+        function=ground.rail_end_max,
+        low=0.0,
+    ),
     # Works and gains of the whole run: the guard of the energy balances them.
     Metric("energy.motor", "work of the motors", 1e3, "mJ", detail=True),
     Metric("energy.force", "work of the pushes", 1e3, "mJ", detail=True),

@@ -56,6 +56,9 @@ HIP_COLUMNS = ("hip_z", "hip_dot_z")
 GROUND_COLUMNS = ("ground_x", "ground_z")
 """The ground's force on the foot."""
 
+RAIL_COLUMN = "rail_end"
+"""The force of the rail's lower end on the trunk, upwards [N]."""
+
 BELT_COLUMN = "belt_x"
 """How far a treadmill's belt has run."""
 

@@ -116,6 +116,23 @@ def measure(leg: FiveBar, record: Mapping[str, Array], window: slice) -> GroundM
     )
 
 
+def foot_share(leg: FiveBar, record: Mapping[str, Array], window: slice) -> float | None:
+    """Return the part of the vertical force over the window that the foot carried, in [0, 1].
+
+    The rail's end carries the rest. None if neither carried anything.
+    """
+    del leg
+    foot = float(record["ground_z"][window].sum())
+    rail = float(record["rail_end"][window].sum())
+    return foot / (foot + rail) if foot + rail > 0.0 else None
+
+
+def rail_end_max(leg: FiveBar, record: Mapping[str, Array], window: slice) -> float:
+    """Return the largest force of the rail's end on the trunk in the whole run [N]."""
+    del leg, window
+    return float(record["rail_end"].max())
+
+
 def _longest(chosen: Bools) -> int:
     """Return the length of the longest run of True."""
     # Runs begin and end where False turns into True and back.

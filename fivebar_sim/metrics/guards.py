@@ -48,6 +48,7 @@ class Guards(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
             energy turned over.
         floor: Largest depth of a joint or the trunk in the floor, as a part of the leg's size.
         stops: Largest angle by which a joint may lean into a stop [rad]; above 0 the stop pushes.
+        rail: Largest force of the rail's end on the trunk [N].
     """
 
     loop: float = 0.01
@@ -59,6 +60,7 @@ class Guards(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     step: float = 0.02
     floor: float = 0.01
     stops: float = 1e-5
+    rail: float = 0.0
 
     def __post_init__(self) -> None:
         check_number("loop", self.loop, "", low=0.0)
@@ -67,6 +69,7 @@ class Guards(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
         check_number("chatter", self.chatter, "", low=0.0, high=1.0)
         for part in ("energy", "constraints", "step", "floor", "stops"):
             check_number(part, getattr(self, part), "", low=0.0)
+        check_number("rail", self.rail, "N", low=0.0)
 
 
 class Guard(Table, frozen=True):
@@ -241,6 +244,13 @@ def _through_floor(run: Evidence) -> Found | None:
     return _first_of(run, found, run.bounds.floor * run.leg.size)
 
 
+def _carrying_rail(run: Evidence) -> Found | None:
+    if "rail_end" not in run.record:
+        return None
+    # What the end carries, foot and motors do not: their load would be that of a lighter robot.
+    return _highest(run, run.record["rail_end"], run.bounds.rail)
+
+
 def _highest(run: Evidence, values: Array, high: float) -> Found:
     return Found(float(values.max()), high, _first(values > high, run.record["time"]))
 
@@ -350,6 +360,14 @@ GUARDS = (
         ", by {:.3g} mm at worst",
         1e3,
         "mm",
+    ),
+    Row(
+        "rail",
+        _carrying_rail,
+        "the rail's end carried the trunk, with more than {:.3g} N",
+        ", {:.3g} N at worst",
+        1.0,
+        "N",
     ),
 )
 """Every guard, in the order of metrics.json; a new guard is a row and a function."""

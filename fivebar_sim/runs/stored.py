@@ -10,7 +10,14 @@ import numpy as np
 from fivebar_sim.errors import FiveBarError, RunDirectoryError
 from fivebar_sim.kinematics.stops import SPEED_LIMIT
 from fivebar_sim.metrics import load
-from fivebar_sim.metrics.columns import BELT_COLUMN, COLUMNS, GROUND_COLUMNS, HIP_COLUMNS, Record
+from fivebar_sim.metrics.columns import (
+    BELT_COLUMN,
+    COLUMNS,
+    GROUND_COLUMNS,
+    HIP_COLUMNS,
+    RAIL_COLUMN,
+    Record,
+)
 from fivebar_sim.metrics.measured import Judged
 from fivebar_sim.runs import directory, stored_metrics
 from fivebar_sim.scenario import Scenario
@@ -114,7 +121,7 @@ def _own_columns(scenario: Scenario) -> list[str]:
     """Return the columns that the scenario's scene adds."""
     columns = []
     if isinstance(scenario.scene, Ground):
-        columns += [*HIP_COLUMNS, *GROUND_COLUMNS]
+        columns += [*HIP_COLUMNS, *GROUND_COLUMNS, RAIL_COLUMN]
     if isinstance(scenario.scene, Treadmill):
         columns.append(BELT_COLUMN)
     return columns

@@ -50,8 +50,8 @@ class Ground(Scene, frozen=True):
         mass: Mass of the trunk on the hip [kg].
         drop: Height of the foot above the floor at the start [m]; 0 starts standing.
         friction: Coulomb's coefficient between foot and floor; 0 is practically frictionless.
-        stop: Lowest height of the hip above the floor [m]: there the rail ends, and the trunk rests
-            while the foot swings, as on the other legs. None: it falls as far as the leg lets it.
+        stop: Lowest height of the hip above the floor [m]: there the rail ends. If its end carries
+            the trunk, the guard "rail" fails the run. None: no end.
     """
 
     mass: float = 0.5

@@ -19,6 +19,7 @@ from fivebar_sim.metrics.columns import (
     HIP_COLUMNS,
     JOINTS,
     MOTOR_JOINTS,
+    RAIL_COLUMN,
     Record,
 )
 from fivebar_sim.metrics.tracking import left_path
@@ -143,12 +144,28 @@ def _surroundings(planned: Plan, states: States, begin: int) -> Record:
         hip = (states.qpos[0, :, 0], states.qvel[0, :, 0])
         record |= dict(zip(HIP_COLUMNS, hip, strict=True))
         record |= dict(zip(GROUND_COLUMNS, states.ground[0].T, strict=True))
+        record[RAIL_COLUMN] = _rail_end(planned, states, begin)
 
     if isinstance(scene, Treadmill):
         record[BELT_COLUMN] = (
             -(scene.speed or 0.0) * planned.motion.time[begin + 1 : begin + steps + 1]
         )
     return record
+
+
+def _rail_end(planned: Plan, states: States, begin: int) -> Array:
+    """Return the force of the rail's lower end on the trunk in each step [N], (N,)."""
+    slide = planned.model.joint("hip_z")
+    height = states.qpos[0, :, 0]
+    if not planned.model.jnt_limited[slide.id]:
+        return np.zeros_like(height)
+
+    # Floor and rail's end are all that the world does to leg and trunk along z; the rest is inside.
+    force = states.constraint[0, :, 0] - states.ground[0, :, 1]
+    first = planned.start[:1] if begin == 0 else height[:1]
+    before = np.concatenate([first, height[:-1]])
+    # The end acts in steps that begin below it; elsewhere the difference is rounding.
+    return np.where(before < slide.range[0], force, 0.0)
 
 
 def broken(planned: Plan, states: States, error: DivergedError) -> DivergedError:
