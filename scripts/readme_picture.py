@@ -1,6 +1,7 @@
 """./.venv/bin/python scripts/readme_picture.py: draws docs/leg.gif, the README's moving picture.
 
-The classic leg on its treadmill, one step at half speed. Equal machines give equal bytes.
+The classic leg on its treadmill, one stride at a quarter of its speed. Equal machines give equal
+bytes.
 """
 
 from __future__ import annotations
@@ -16,6 +17,6 @@ OUT = Path(__file__).resolve().parent.parent / "docs" / "leg.gif"
 
 if __name__ == "__main__":
     result = rollout.run(Scenario.load("treadmill-trot"))
-    film = render.Film(width=480, height=360, fps=30.0, speed=0.5)
+    film = render.Film(width=480, height=360, fps=30.0, speed=0.25)
     count = render.write(replay(result.scenario, result.record), OUT, film)
     print(f"wrote {OUT.name}: {count} frames, {OUT.stat().st_size / 1e3:.0f} kB")

@@ -106,7 +106,7 @@ def test_states_are_the_scenarios(kind: str, settings: tuple[str, ...]) -> None:
     if isinstance(ground, Treadmill):  # whose rail ends where the task says
         wanted = Scenario.load(
             "treadmill-trot",
-            [*SHORT, *settings, f"scene.stop={ground.stop}"],
+            [*SHORT, *settings, f"scene.stop={ground.stop}", f"scene.speed={ground.speed}"],
         )
     table = actions(task)
     theirs = played(wanted, table)

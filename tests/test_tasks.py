@@ -9,12 +9,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fivebar_sim import FiveBar, dynamics, kinematics, tasks
+from fivebar_sim import FiveBar, dynamics, kinematics, tasks, workspace
 from fivebar_sim.control import Observation
 from fivebar_sim.control.servo import Drive, Servo, ServoArrays, applied_torque
 from fivebar_sim.errors import ArgumentError, ConfigError, UnreachableError
 from fivebar_sim.kinematics.leg_arrays import LegArrays
-from fivebar_sim.paths import Circle, Line
+from fivebar_sim.paths import Circle, Gait, Line
+from fivebar_sim.scenario.scenes import Treadmill
 from fivebar_sim.tasks import KINDS, REASONS, Randomise, Task
 from fivebar_sim.tasks.episodes import Episodes, part_at
 from fivebar_sim.tasks.legs import LegGroup, starts
@@ -125,6 +126,21 @@ def test_draws_stay_in_their_ranges(seed: int) -> None:
     assert drawn.servo.kd == nominal.servo.kd
     assert 0.0 < drawn.servo.delay <= 0.01
     assert drawn.path == nominal.foot_path
+
+
+@pytest.mark.parametrize("leg", ["classic", "q8bot", "minitaur", "doggo"])
+def test_rail_of_the_gait_ends_below_every_stance(leg: str) -> None:
+    """Where the hip is while the foot is on the belt, and the path can be followed at all."""
+    task = tasks.task("gait", leg=leg)
+    path = task.foot_path
+    assert isinstance(path, Gait)
+    time = np.linspace(0.0, 2.0, 2001)
+    foot = path.at(time).position
+    assert workspace.reachable(task.leg, foot, mode=task.leg.mode).all()
+    assert isinstance(task.scene, Treadmill)
+    assert task.scene.stop is not None
+    stance = task.leg.foot_radius - foot[path.cycle(time) < path.duty, 1]
+    assert task.scene.stop < 0.8 * stance.min()
 
 
 def test_no_ranges_draw_the_leg_itself() -> None:

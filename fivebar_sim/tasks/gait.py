@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from typing import ClassVar
 
 from fivebar_sim import paths
 from fivebar_sim.arrays import Array
 from fivebar_sim.errors import ConfigError
+from fivebar_sim.paths.gait import GRAVITY
 from fivebar_sim.scenario.scenes import Scene, Treadmill
 from fivebar_sim.tasks.base import Grounded, Part, closeness, effort, phase
 from fivebar_sim.tasks.motion import Motion
@@ -18,8 +20,9 @@ class Gait(Grounded, frozen=True, tag="gait"):
         tracking = exp(-|F - F*|^2 / (0.1 size)^2),   effort = mean |tau|^2
         slip = (F_dot_x + v)^2 where the foot touches the belt, else 0
 
-    In swing the trunk rests on the rail's end, a hundredth of the size lower than in stance. The
-    default path is a trot below the rest pose: stride 0.4 size, lift 0.15 size, twice a second.
+    Nothing else carries the trunk: the rail ends at half the height of touch-down, far below any
+    gait. The default path is a run below the rest pose: stride 0.4 size, lift 0.15 size, five
+    strides a second for the classic leg and fewer for a longer one, as of a pendulum.
     """
 
     WEIGHTS: ClassVar[dict[str, float]] = {"tracking": 1.0, "slip": -1.0, "effort": -0.1}
@@ -45,12 +48,12 @@ class Gait(Grounded, frozen=True, tag="gait"):
             friction=self.friction,
             drop=self.drop,
             speed=path.stance_speed,
-            stop=leg.foot_radius - path.centre[1] - 0.01 * leg.size,
+            stop=0.5 * (leg.foot_radius - path.centre[1]),
         )
 
     @property
     def foot_path(self) -> paths.Gait:
-        """The path, or the default trot."""
+        """The path, or the default run."""
         if self.path is not None:
             assert isinstance(self.path, paths.Gait)
             return self.path
@@ -61,8 +64,9 @@ class Gait(Grounded, frozen=True, tag="gait"):
             centre=(x, z - 0.08 * size),
             stride=0.4 * size,
             lift=0.15 * size,
-            frequency=2.0,
-            duty=0.6,
+            frequency=0.5 * math.sqrt(GRAVITY / size),
+            duty=0.7,
+            running=True,
             ramp=0.1,
         )
 
