@@ -20,7 +20,7 @@ from typing import Any
 from fivebar_sim.checks import check_number
 from fivebar_sim.errors import ConfigError, GeometryError, unknown
 from fivebar_sim.files import presets
-from fivebar_sim.links import Link, ball, capsule, combined, moved
+from fivebar_sim.links import Link, ball, capsule, combined, moved, rod
 
 Mode = tuple[int, int]
 Four = tuple[float, float, float, float]
@@ -53,8 +53,9 @@ class FiveBar:
     Without `mass`, a link is a capsule of `radius` and `density` between its joints, and L2 also
     carries the foot, a ball of `foot_radius`. With `mass`, the four numbers are the masses of the
     whole links (foot and extension included), `com` their centres of mass along the link from the
-    inner joint (default: the middle of L1..L4), and `inertia` their inertias about those centres
-    (default: slender rods, m L^2 / 12).
+    inner joint, `com_across` how far beside the line, and `inertia` their inertias about those
+    centres. By default links are slender rods, m L^2 / 12 about their middle; L2 with its extension
+    is one rod bent at C, B-C-F, of the same mass per length all along.
 
     Attributes:
         L1: |AB| [m].
@@ -69,6 +70,8 @@ class FiveBar:
         assembly: +1 or -1, the sign of BDx BCz - BDz BCx.
         mass: Masses of L1..L4 [kg], or None for capsules.
         com: Centres of mass along L1..L4 [m], only with `mass`.
+        com_across: Centres of mass across L1..L4 [m], along turned by +90 deg (towards growing
+            theta), only with `com`; None: 0, on the lines.
         inertia: Inertias of L1..L4 about their centres [kg m^2], only with `mass`.
         radius: Radius of the capsules [m]; with `mass` only pictures and the guard `floor` need it.
         density: Density of capsules and foot [kg/m^3].
@@ -93,6 +96,7 @@ class FiveBar:
     mass: Four | None = None
     com: Four | None = None
     inertia: Four | None = None
+    com_across: Four | None = None
     radius: float = 0.004
     density: float = 1200.0
     foot_radius: float = 0.006
@@ -164,11 +168,13 @@ class FiveBar:
 
     def _check_masses(self) -> None:
         if self.mass is None:
-            for key in ("com", "inertia"):
+            for key in ("com", "com_across", "inertia"):
                 if getattr(self, key) is not None:
                     raise GeometryError(f"{key} needs mass beside it: four numbers [kg]")
             return
-        for key in ("mass", "com", "inertia"):
+        if self.com is None and self.com_across is not None:
+            raise GeometryError("com_across needs com beside it: four numbers [m]")
+        for key in ("mass", "com", "com_across", "inertia"):
             if getattr(self, key) is not None:
                 object.__setattr__(self, key, _floats(key, getattr(self, key), 4))
         for key in ("mass", "inertia"):
@@ -185,13 +191,7 @@ class FiveBar:
         """The inertias of L1..L4; the foot and the extension belong to L2."""
         lengths = (self.L1, self.L2, self.L3, self.L4)
         if self.mass is not None:
-            com = self.com or tuple(0.5 * L for L in lengths)
-            inertia = self.inertia or tuple(
-                m * L**2 / 12 for m, L in zip(self.mass, lengths, strict=True)
-            )
-            L1, L2, L3, L4 = (
-                Link(m, (c, 0.0), i) for m, c, i in zip(self.mass, com, inertia, strict=True)
-            )
+            L1, L2, L3, L4 = (self._explicit(k, self._rod(k)) for k in range(4))
             return L1, L2, L3, L4
 
         L1, L2, L3, L4 = (capsule(L, self.radius, self.density) for L in lengths)
@@ -202,6 +202,29 @@ class FiveBar:
             parts.append(moved(extension, (self.L2, 0.0), self.bend))
 
         return L1, combined(*parts), L3, L4
+
+    def _rod(self, k: int) -> Link:
+        """Return link k = 0..3 as a slender rod with its own mass; L2 with its extension."""
+        assert self.mass is not None
+        mass = self.mass[k]
+        length = (self.L1, self.L2, self.L3, self.L4)[k]
+        if k != 1 or self.L6 == 0.0:
+            return rod(mass, length)
+
+        extension = rod(mass * self.L6 / (self.L2 + self.L6), self.L6)
+        straight = rod(mass * self.L2 / (self.L2 + self.L6), self.L2)
+        bent = combined(straight, moved(extension, (self.L2, 0.0), self.bend))
+        # The two parts may miss the mass that was given by a rounding.
+        return bent._replace(mass=mass)
+
+    def _explicit(self, k: int, link: Link) -> Link:
+        """Return link k = 0..3 with the centre and the inertia that were given, if any."""
+        if self.com is not None:
+            across = self.com_across or (0.0,) * 4
+            link = link._replace(com=(self.com[k], across[k]))
+        if self.inertia is not None:
+            link = link._replace(inertia=self.inertia[k])
+        return link
 
     @property
     def foot_offset(self) -> tuple[float, float]:
@@ -264,7 +287,8 @@ def _floats(key: str, values: object, count: int) -> tuple[float, ...]:
 
 
 UNITS = {
-    **dict.fromkeys(("L1", "L2", "L3", "L4", "L5", "L6", "radius", "foot_radius", "com"), "m"),
+    **dict.fromkeys(("L1", "L2", "L3", "L4", "L5", "L6", "radius", "foot_radius"), "m"),
+    **dict.fromkeys(("com", "com_across"), "m"),
     **dict.fromkeys(("bend", "tilt"), "rad"),
     **dict.fromkeys(("inertia", "armature"), "kg m^2"),
     "mass": "kg",

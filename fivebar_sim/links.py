@@ -42,6 +42,11 @@ def ball(radius: float, density: float) -> Link:
     return Link(mass, (0.0, 0.0), 0.4 * mass * radius**2)
 
 
+def rod(mass: float, length: float) -> Link:
+    """Return the inertia of a slender rod between its two joints: I = m L^2 / 12."""
+    return Link(mass, (0.5 * length, 0.0), mass * length**2 / 12)
+
+
 def moved(body: Link, at: tuple[float, float], angle: float = 0.0) -> Link:
     """Return a body turned by angle [rad] about its frame's origin, then shifted by `at` [m]."""
     x, y = body.com

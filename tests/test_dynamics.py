@@ -27,6 +27,7 @@ HEAVY = FiveBar(  # nothing equal, nothing in the middle of a link
     *(0.05, 0.04, 0.035, 0.07, 0.09, 0.02, 0.5, 0.3),
     mass=(0.03, 0.05, 0.02, 0.07),
     com=(0.012, 0.031, 0.015, 0.02),
+    com_across=(0.003, -0.005, 0.004, -0.002),
     inertia=(1e-5, 4e-5, 2e-5, 3e-5),
     armature=3e-5,
     gravity=ASKEW,

@@ -22,6 +22,7 @@ HEAVY = FiveBar(  # nothing equal, nothing in the middle of a link
     *(0.05, 0.04, 0.035, 0.07, 0.09, 0.02, 0.5, 0.3),
     mass=(0.03, 0.05, 0.02, 0.07),
     com=(0.012, 0.031, 0.015, 0.02),
+    com_across=(0.003, -0.005, 0.004, -0.002),
     inertia=(1e-5, 4e-5, 2e-5, 3e-5),
     armature=3e-5,
     gravity=(2.5, -9.0),
@@ -114,17 +115,25 @@ def test_payload_is_a_point_of_L2s_own_mass(payload: float) -> None:
     """With L6 = 0 the foot is C, on the line of L2, so that the leg's own numbers can carry it."""
     assert PLAIN.mass is not None
     assert PLAIN.com is not None
+    assert PLAIN.com_across is not None
     assert PLAIN.inertia is not None
     m = PLAIN.mass[1]
     c = PLAIN.com[1]
     inertia = PLAIN.inertia[1]
     both = m + payload
     apart = PLAIN.L2 - c
+    across = PLAIN.com_across[1]
+    reduced = m * payload / both
     loaded = replace(
         PLAIN,
         mass=(PLAIN.mass[0], both, *PLAIN.mass[2:]),
         com=(PLAIN.com[0], c + payload * apart / both, *PLAIN.com[2:]),
-        inertia=(PLAIN.inertia[0], inertia + m * payload / both * apart**2, *PLAIN.inertia[2:]),
+        com_across=(PLAIN.com_across[0], m * across / both, *PLAIN.com_across[2:]),
+        inertia=(
+            PLAIN.inertia[0],
+            inertia + reduced * (apart**2 + across**2),
+            *PLAIN.inertia[2:],
+        ),
     )
     carried = answers(PLAIN, PLAIN, payload=payload)
     own = answers(loaded, PLAIN)

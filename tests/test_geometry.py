@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import FrozenInstanceError
+from dataclasses import FrozenInstanceError, replace
 from pathlib import Path
 from typing import Any
 
@@ -120,9 +120,44 @@ def test_given_masses_are_the_whole_links() -> None:
         (0.0, 0.0),
     ]
     assert [link.inertia for link in LUMPED.links] == [1e-5, 2e-5, 3e-5, 4e-5]
-    rods = FiveBar(L6=0.02, mass=(0.12, 0.12, 0.24, 0.24)).links
-    assert [link.com[0] for link in rods] == [0.02, 0.03, 0.03, 0.02]
+    rods = FiveBar(mass=(0.12, 0.12, 0.24, 0.24)).links
+    assert [link.com for link in rods] == [(0.02, 0.0), (0.03, 0.0), (0.03, 0.0), (0.02, 0.0)]
     assert [link.inertia for link in rods] == pytest.approx([1.6e-5, 3.6e-5, 7.2e-5, 3.2e-5])
+
+
+def test_centres_may_lie_off_the_lines() -> None:
+    across = (0.001, -0.002, 0.003, -0.004)
+    beside = replace(LUMPED, com_across=across)
+    assert [link.com for link in beside.links] == [
+        (0.01, 0.001),
+        (0.02, -0.002),
+        (-0.03, 0.003),
+        (0.0, -0.004),
+    ]
+    assert [link.inertia for link in beside.links] == [link.inertia for link in LUMPED.links]
+
+
+@pytest.mark.parametrize("bend", [0.0, 0.35, -1.2, 3.0])
+def test_rod_of_the_foot_link_goes_on_to_the_foot(bend: float) -> None:
+    """Mass spread evenly along B-C-F, added up in pieces; the other rods end at their joints."""
+    leg = FiveBar(L6=0.025, bend=bend, mass=(0.12, 0.17, 0.24, 0.24))
+    pieces = 200_000
+    s = (np.arange(pieces) + 0.5) / pieces * (leg.L2 + leg.L6)
+    turn = np.exp(1j * bend)
+    place = np.where(s < leg.L2, s, leg.L2 + (s - leg.L2) * turn)
+    centre = place.mean()
+    L1, L2, L3, L4 = leg.links
+    assert L2.mass == 0.17
+    assert complex(*L2.com) == pytest.approx(centre, abs=1e-12)
+    assert L2.inertia == pytest.approx(0.17 * np.mean(np.abs(place - centre) ** 2), rel=1e-8)
+    straight = FiveBar(mass=leg.mass).links
+    assert (L1, L3, L4) == (straight[0], straight[2], straight[3])
+
+
+def test_straight_extension_is_one_longer_rod() -> None:
+    leg = FiveBar(L6=0.02, mass=(0.12, 0.12, 0.24, 0.24))
+    assert leg.links[1].com == pytest.approx((0.04, 0.0))
+    assert leg.links[1].inertia == pytest.approx(0.12 * 0.08**2 / 12)
 
 
 # presets and files
@@ -265,6 +300,11 @@ def test_assembly_is_a_sign(bad: Any) -> None:
             r"^inertia must be in \(0, .* kg m\^2, got 0",
         ),
         ({"com": (0, 0, 0, 0)}, "^com needs mass beside it: four numbers"),
+        ({"com_across": (0, 0, 0, 0)}, "^com_across needs mass beside it: four numbers"),
+        (
+            {"mass": (1, 1, 1, 1), "com_across": (0, 0, 0, 0)},
+            r"^com_across needs com beside it: four numbers \[m\]",
+        ),
         ({"inertia": (1, 1, 1, 1)}, "^inertia needs mass beside it"),
         ({"L6": 0.06, "bend": math.pi}, "^L6: the foot lies on B"),
         ({"gravity": -9.81}, r"^gravity must be 2 numbers \[m/s\^2\], got -9\.81"),

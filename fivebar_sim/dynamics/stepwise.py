@@ -290,8 +290,8 @@ def _follow(
     alpha3 = -dot((x, z), e4) / (L3 * sine) - b * w3
 
     # From alpha' back to alpha = (M + h D)^-1 M alpha', where only E, and so row 4, is damped.
-    # S3 has no component across, since L3's centre of mass lies on its line.
-    H43 = L4 * chain.S3[0] * dot(e4, e3)
+    # Of L3's moment the part across is e3 turned by +90 deg: e4 . perp(e3) = e3 x e4.
+    H43 = L4 * chain.S3[0] * dot(e4, e3) + L4 * chain.S3[1] * cross(e3, e4)
     share = h * damping / (chain.I3 * chain.I4 - H43 * H43)
     alpha4 /= 1.0 + share * chain.I3
     alpha3 += share * H43 * alpha4
