@@ -24,7 +24,10 @@ from fivebar_sim.report import comparison, look, single
 from fivebar_sim.runs import directory, stored
 from fivebar_sim.scenario import Scenario
 
-AIR = ["foot-path", "leg-moments", "tracking-error", "load-share", "torque", "loop-gap"]
+AIR = [
+    *("foot-path", "leg-moments", "tracking-error", "error-parts", "torque", "angles"),
+    *("speeds", "power", "torque-speed", "load-share", "loop-gap"),
+]
 GROUNDED = [*AIR[:-1], "ground", "loop-gap"]
 OVERLAID = ["foot-path", "torque", "tracking-error", "loop-gap", "load-share", "ground"]
 APART = ("verdict", "limits", "guards", "provenance")

@@ -108,7 +108,7 @@ def test_page_is_alone_drawn_and_fits(
         assert page.evaluate("document.documentElement.scrollWidth") <= width
         assert page.evaluate(TOO_WIDE) == []
         figures = page.evaluate(FIGURES)
-        assert len(figures) == (7 if which == "one" else 6)
+        assert len(figures) == (12 if which == "one" else 6)
         for figure in figures:
             assert 300.0 < figure["width"] <= width
             assert figure["height"] > 120.0

@@ -7,11 +7,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from fivebar_controllers.pd import Pd
 from judged import judged
 from msgspec.structs import replace
 
 from fivebar_sim import rollout
-from fivebar_sim.report import comparison, in_plane, look, numbers, over_time
+from fivebar_sim.report import axes, comparison, draw, in_plane, look, motors, numbers, over_time
 from fivebar_sim.runs.stored import StoredRun
 from fivebar_sim.scenario import Scenario
 
@@ -80,8 +81,8 @@ def test_figures_show_the_record(ellipse: StoredRun) -> None:
     error = np.hypot(record["foot_x"] - record["target_x"], record["foot_z"] - record["target_z"])
     with look.project_style():
         path, tracking, torque = (
-            draw(ellipse).figure.axes
-            for draw in (in_plane.foot_path, over_time.tracking_error, over_time.torque)
+            each(ellipse).figure.axes
+            for each in (in_plane.foot_path, over_time.tracking_error, over_time.torque)
         )
     target, *pieces, start = path[0].lines
     np.testing.assert_allclose(np.asarray(target.get_xdata()), 1e3 * record["target_x"])
@@ -100,6 +101,109 @@ def test_figures_show_the_record(ellipse: StoredRun) -> None:
     for ax, motor in zip(torque, "AE", strict=True):
         ring = np.asarray(ax.lines[3].get_ydata())
         assert abs(ring[0]) == pytest.approx(1e3 * ellipse.metrics["load"]["torque_peak"][motor])
+
+
+def test_power_of_the_window_is_the_work_of_the_metrics(ellipse: StoredRun) -> None:
+    """The integral of torque times speed is the net work, to rounding."""
+    window = ellipse.scenario.window
+    for motor in "AE":
+        work = 1e-3 * numbers.power(ellipse, motor)[window].sum()
+        assert work == pytest.approx(ellipse.metrics["load"]["work"][motor]["net"], abs=1e-12)
+        watts = ellipse.record[f"torque_{motor}"] * ellipse.record[f"theta_dot_{motor}"]
+        # a mean over the step against the rate at its end
+        assert numbers.power(ellipse, motor) == pytest.approx(watts, abs=0.05 * np.abs(watts).max())
+
+
+def test_motors_are_drawn_from_the_record(ellipse: StoredRun) -> None:
+    record = ellipse.record
+    with look.project_style():
+        angles, speeds, power = (
+            each(ellipse).figure.axes for each in (motors.angles, motors.speeds, motors.power)
+        )
+        (parts,) = over_time.error_parts(ellipse).figure.axes
+    for k, motor in enumerate("AE"):
+        drawn = [np.asarray(line.get_ydata()) for line in angles[k].lines[:2]]
+        np.testing.assert_allclose(np.radians(drawn[0]), record[f"theta_{motor}"])
+        np.testing.assert_allclose(np.radians(drawn[1]), record[f"ctrl_{motor}"])
+        speed = np.asarray(speeds[0].lines[k].get_ydata())
+        np.testing.assert_allclose(speed, record[f"theta_dot_{motor}"])
+        assert "mW" in power[0].get_ylabel()
+        drawn = np.asarray(power[0].lines[k].get_ydata())
+        np.testing.assert_allclose(drawn, 1e3 * numbers.power(ellipse, motor))
+        ahead = record[f"foot_{'xz'[k]}"] - record[f"target_{'xz'[k]}"]
+        np.testing.assert_allclose(np.asarray(parts.lines[k].get_ydata()), 1e3 * ahead)
+
+
+def test_a_torque_drive_has_no_setpoints(ellipse: StoredRun) -> None:
+    steered = ellipse.scenario.driven_by(Pd(kp=3.0))
+    with look.project_style():
+        drawn = motors.angles(ellipse._replace(scenario=steered))
+    assert "setpoint" not in drawn.caption
+    assert all(len(ax.lines) == 1 or ax.lines[1].get_gid() == "cut" for ax in drawn.figure.axes)
+
+
+def test_torque_against_speed_is_inside_the_servo_s_line(ellipse: StoredRun) -> None:
+    """At rest the line is the limit, at the no-load speed nothing; only the window is drawn."""
+    scenario = ellipse.scenario
+    peak = max(ellipse.metrics["load"]["torque_peak"].values())
+    window = scenario.window
+    speeds = np.stack([ellipse.record[f"theta_dot_{motor}"][window] for motor in "AE"])
+    limited = replace(scenario.servo, limit=2.0 * peak, speed=3.0 * float(np.abs(speeds).max()))
+    with look.project_style():
+        drawn = motors.torque_speed(ellipse._replace(scenario=replace(scenario, servo=limited)))
+        free = motors.torque_speed(ellipse)
+    (ax,) = drawn.figure.axes
+    low, high = (line for line in ax.lines if line.get_linestyle() == "-.")
+    for edge, side in ((low, -1.0), (high, 1.0)):
+        v, tau = (np.asarray(values) for values in edge.get_data())
+        np.testing.assert_allclose(tau, 1e3 * (side * 2.0 * peak - 2.0 * peak / limited.speed * v))
+    for motor, line in zip("AE", ax.lines, strict=False):
+        v, tau = (np.asarray(values) for values in line.get_data())
+        assert len(v) == scenario.window.stop - scenario.window.start
+        np.testing.assert_allclose(
+            np.sort(v), np.sort(ellipse.record[f"theta_dot_{motor}"][window])
+        )
+        assert (np.abs(tau + 1e3 * 2.0 * peak / limited.speed * v) < 2e3 * peak).all()
+    assert "no limit" in free.caption
+
+
+def test_axes_are_scaled_by_the_window_and_what_is_cut_is_marked(landing: StoredRun) -> None:
+    """The landing at 0.1 s is before the window: its peaks are told, and hide nothing behind."""
+    window = landing.scenario.window
+    with look.project_style():
+        figures = [
+            over_time.tracking_error(landing),
+            over_time.error_parts(landing),
+            over_time.torque(landing),
+            motors.angles(landing),
+            motors.speeds(landing),
+            motors.power(landing),
+        ]
+    for drawn in figures:
+        assert axes.CUT in drawn.caption
+        for ax in drawn.figure.axes:
+            bottom, top = ax.get_ylim()
+            said = [float(text.get_text()) for text in ax.texts]
+            marks = [line for line in ax.lines if line.get_gid() == "cut"]
+            assert len(said) == len(marks) > 0
+            lines = [line for line in ax.lines if len(np.asarray(line.get_xdata())) > 100]
+            values = np.concatenate([np.asarray(line.get_ydata()) for line in lines])
+            inside = np.concatenate([np.asarray(line.get_ydata())[window] for line in lines])
+            assert bottom <= inside.min() <= inside.max() <= top
+            for peak, edge in ((values.max(), top), (values.min(), bottom)):
+                beyond = peak > top or peak < bottom
+                assert (pytest.approx(peak, rel=5e-3) in said) == beyond, edge
+
+
+def test_only_what_is_beyond_the_axes_is_marked(ellipse: StoredRun) -> None:
+    rows = len(ellipse.record["time"])
+    gap = np.full(rows, np.nan)
+    for high, low, said in ((1.0, -1.0, []), (1.25, -1.0, ["1.25"]), (1.0, -2e4, ["-20000"])):
+        with look.project_style():
+            _, (ax,) = draw.panels(1, height=2.0)
+            ax.set_ylim(-1.0, 1.0)
+            assert axes.mark_cut(ax, ellipse, gap, np.linspace(low, high, rows)) == bool(said)
+        assert [text.get_text() for text in ax.texts] == said
 
 
 def test_share_is_undefined_without_load(ellipse: StoredRun) -> None:

@@ -35,6 +35,9 @@ CELLS = 81
 HARDLY = 0.05
 """A foot that travels less than this part of the leg's size in a period hardly moves."""
 
+BESIDE = 9.0
+"""Distance of a joint's letter from it [pt]."""
+
 BANDS = 4
 """Shades of the workspace, from its edge to its deepest point."""
 
@@ -111,8 +114,7 @@ def leg_moments(run: StoredRun) -> Drawn:
             ax.plot(*(1e3 * np.array(chain)).T, "o-", color=colour(name), ms=3, **look)
 
     ax.plot(*(1e3 * points(run.record, "foot")).T, color=colour("foot"), lw=1.0)
-    for letter, point in (("A", A), ("B", p.B[-1]), ("C", p.C_left[-1]), ("D", p.D[-1]), ("E", E)):
-        ax.annotate(letter, tuple(1e3 * point), (4, 4), textcoords="offset points", weight="bold")
+    _letter(ax, {"A": A, "B": p.B[-1], "C": p.C_left[-1], "D": p.D[-1], "E": E})
 
     times = run.record["time"][rows]
     return Drawn(
@@ -126,6 +128,24 @@ def leg_moments(run: StoredRun) -> Drawn:
         "region that its foot reaches.",
         figure,
     )
+
+
+def _letter(ax: Axes, joints: dict[str, Array]) -> None:
+    """Write the letters of joints beside them, away from the middle of all, where no link is."""
+    middle = np.mean(list(joints.values()), axis=0)
+    for letter, point in joints.items():
+        away = point - middle
+        # Never two joints at one place and in the middle: a leg has links.
+        offset = BESIDE * away / max(float(np.hypot(*away)), 1e-12)
+        ax.annotate(
+            letter,
+            tuple(1e3 * point),
+            tuple(offset),
+            textcoords="offset points",
+            weight="bold",
+            ha="center",
+            va="center",
+        )
 
 
 def _workspace(ax: Axes, run: StoredRun) -> float:

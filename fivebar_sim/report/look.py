@@ -134,4 +134,6 @@ def _rounded(path: str) -> str:
     return re.sub(r"-?\d+\.\d{3,}", lambda found: f"{float(found[0]):.2f}", path)
 
 
-_VARIABLES = {pair[0]: f"var(--{name})" for name, pair in (COLOURS | SOFT).items()}
+_VARIABLES = {
+    pair[0]: f"var(--{name})" for name, pair in {"paper": PAPER, **COLOURS, **SOFT}.items()
+}

@@ -9,6 +9,7 @@ import numpy as np
 
 from fivebar_sim.arrays import Array
 from fivebar_sim.control import Feedback
+from fivebar_sim.control.servo import Drive
 from fivebar_sim.files import tables
 from fivebar_sim.metrics import load
 from fivebar_sim.metrics.catalogue import GROUND_KEYS, SHOWN
@@ -20,6 +21,9 @@ from fivebar_sim.runs.stored import StoredRun
 
 PERCENTILE = 95.0
 """Percentile of the tracking error that is shown beside its RMS."""
+
+IN_VIEW = 3.0
+"""A torque limit is drawn if it is at most this many times the largest torque."""
 
 
 def name_of(run: StoredRun) -> str:
@@ -56,23 +60,50 @@ def share(run: StoredRun) -> Array:
     return drawn
 
 
+def drive(run: StoredRun) -> Drive:
+    """Return whether the motors were sent angles or torques."""
+    controller = run.scenario.controller
+    return controller.drive if isinstance(controller, Feedback) else "position"
+
+
 def torque_band(run: StoredRun, motor: str) -> tuple[Array, Array] | None:
     """Return the least and the largest torque of a motor at its rate [N m], (N,) each.
+
+    MuJoCo clips by the state at the start of a step, so a step may end a little beyond. Returns
+    None for a servo without a limit.
+    """
+    if run.scenario.servo.limit is None:
+        return None
+    return band_at(run, run.record[f"theta_dot_{motor}"])
+
+
+def band_at(run: StoredRun, rate: Array) -> tuple[Array, Array]:
+    """Return the least and the largest torque of the run's servo at some rates [N m].
 
     With the servo's limit and its damping c at the rate v (see `servo.Servo`):
 
         -limit - c v,   limit - c v
 
-    MuJoCo clips by the state at the start of a step, so a step may end a little beyond. Returns
-    None for a servo without a limit.
+    Args:
+        run: A run whose servo has a limit.
+        rate: v [rad/s].
     """
     servo = run.scenario.servo
-    controller = run.scenario.controller
-    if servo.limit is None:
-        return None
-    drive = controller.drive if isinstance(controller, Feedback) else "position"
-    lost = servo.passive(drive) * run.record[f"theta_dot_{motor}"]
+    assert servo.limit is not None
+    lost = servo.passive(drive(run)) * rate
     return -servo.limit - lost, servo.limit - lost
+
+
+def power(run: StoredRun, motor: str) -> Array:
+    """Return the mean mechanical power of a motor in each step [W], (N,).
+
+    The torque is constant over a step, which turns the motor by the difference of its angles.
+    """
+    h = run.scenario.sim.timestep
+    theta = run.record[f"theta_{motor}"]
+    # The record begins after the first step: its turn is that of the rate it ended with.
+    turned = np.diff(theta, prepend=theta[0] - h * run.record[f"theta_dot_{motor}"][0])
+    return run.record[f"torque_{motor}"] * turned / h
 
 
 def flat_metrics(run: StoredRun) -> dict[str, Any]:

@@ -11,7 +11,8 @@ from fivebar_sim.metrics import ground, tracking
 from fivebar_sim.metrics.catalogue import shown
 from fivebar_sim.metrics.limits import look_up
 from fivebar_sim.recording.plots import SHARE_WINDOW
-from fivebar_sim.report import draw, numbers
+from fivebar_sim.recording.poses import points
+from fivebar_sim.report import axes, draw, numbers
 from fivebar_sim.report.draw import Drawn
 from fivebar_sim.report.look import colour
 from fivebar_sim.runs.stored import StoredRun
@@ -19,16 +20,13 @@ from fivebar_sim.runs.stored import StoredRun
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-IN_VIEW = 3.0
-"""A torque limit is drawn if it is at most this many times the largest torque."""
-
 
 def tracking_error(run: StoredRun) -> Drawn:
     """Draw the tracking error with its RMS and 95th percentile."""
     error = tracking.tracking_error(run.record)
     most = numbers.percentile(run)
     rms = look_up(run.metrics, "tracking.rms") or 0.0
-    scale, unit = draw.length_unit(float(error.max()))
+    scale, unit = draw.length_unit(float(error[run.scenario.window].max()))
     figure, (ax,) = draw.panels(1, height=2.9)
     draw.line(ax, run.record["time"], scale * error, "foot")
     levels = {"RMS": shown("tracking.rms", rms), "95 %": shown("tracking.rms", most)}
@@ -38,33 +36,63 @@ def tracking_error(run: StoredRun) -> Drawn:
         ax.axhline(scale * value, color=colour("ink"), ls=style, lw=1.4, label=label)
 
     draw.shade_unmeasured(ax, run)
-    ax.set(ylabel=f"|foot - target| [{unit}]", ylim=(0.0, draw.ceiling(scale * error)))
+    top = draw.ceiling(scale * error[run.scenario.window])
+    ax.set(ylabel=f"|foot - target| [{unit}]", ylim=(0.0, top))
+    cut = axes.mark_cut(ax, run, scale * error)
     figure.legend(loc="outside upper center", ncols=2)
 
     return Drawn(
         "tracking-error",
         "Tracking error",
         "Distance of the foot from its target. Shaded: not measured (the ramp from rest, and the "
-        "time after the last whole period).",
+        "time after the last whole period)." + axes.CUT * cut,
         f"Line of the tracking error over time; RMS {levels['RMS']}, 95 % of the steps below "
         f"{levels['95 %']}.",
         figure,
     )
 
 
+def error_parts(run: StoredRun) -> Drawn:
+    """Draw the tracking error along x and along z."""
+    window = run.scenario.window
+    error = points(run.record, "foot") - points(run.record, "target")
+    scale, unit = draw.length_unit(float(np.abs(error[window]).max()))
+    lines = (scale * error).T
+    figure, (ax,) = draw.panels(1, height=2.9)
+
+    for values, tint, name in zip(lines, ("foot", "ink"), "xz", strict=True):
+        draw.line(ax, run.record["time"], values, tint, label=f"along {name}")
+
+    draw.shade_unmeasured(ax, run)
+    ax.set(ylabel=f"foot - target [{unit}]", ylim=axes.measured_range(run, *lines))
+    cut = axes.mark_cut(ax, run, *lines)
+    figure.legend(loc="outside upper center", ncols=2)
+    most = " and ".join(shown("tracking.max", part) for part in np.abs(error[window]).max(axis=0))
+    return Drawn(
+        "error-parts",
+        "Tracking error along x and z",
+        f"How far the foot is ahead of its target (x) and above it (z): at most {most} in the "
+        f"measured time.{axes.CUT * cut}",
+        f"Lines of the tracking error along x and z over time; at most {most}.",
+        figure,
+    )
+
+
 def torque(run: StoredRun) -> Drawn:
     """Draw the torques of A and E with RMS, peak, share, and the servo's limit."""
-    figure, axes = draw.panels(1, 1, height=4.6)
+    figure, both = draw.panels(1, 1, height=4.6)
+    window = run.scenario.window
     # One scale for both motors, or an idle one would look as busy as the other.
-    largest = max(float(np.abs(run.record[f"torque_{motor}"]).max()) for motor in "AE")
-    for ax, motor in zip(axes, "AE", strict=True):
-        _torque(ax, run, motor, largest)
+    largest = max(float(np.abs(run.record[f"torque_{motor}"][window]).max()) for motor in "AE")
+    cut = False
+    for ax, motor in zip(both, "AE", strict=True):
+        cut |= _torque(ax, run, motor, largest)
 
     share = look_up(run.metrics, "load.share_A")
     limit = run.scenario.servo.limit
     note = ""
     if limit is not None:
-        inside = limit <= IN_VIEW * largest
+        inside = limit <= numbers.IN_VIEW * largest
         note = f" The servo's limit is {shown('load.torque_peak.A', limit)} at rest" + (
             ": dash-dotted, for the rate at each time." if inside else ", outside the picture."
         )
@@ -79,15 +107,16 @@ def torque(run: StoredRun) -> Drawn:
     return Drawn(
         "torque",
         "Motor torques",
-        f"What the motors at A and E applied; dashed: plus and minus RMS; ring: the peak.{note}",
+        f"What the motors at A and E applied; dashed: plus and minus RMS; ring: the peak.{note}"
+        f"{axes.CUT * cut}",
         f"Lines of the torques of A and E over time; RMS {rms}, peak {peak}, share of A "
         f"{shown('load.share_A', share)}.",
         figure,
     )
 
 
-def _torque(ax: Axes, run: StoredRun, motor: str, largest: float) -> None:
-    """Draw the torque of one motor; `largest` [N m] sets the scale."""
+def _torque(ax: Axes, run: StoredRun, motor: str, largest: float) -> bool:
+    """Draw the torque of one motor; `largest` [N m] sets the scale. Return whether it is cut."""
     time = run.record["time"]
     tau = 1e3 * run.record[f"torque_{motor}"]
     window = run.scenario.window
@@ -106,15 +135,16 @@ def _torque(ax: Axes, run: StoredRun, motor: str, largest: float) -> None:
     limit = run.scenario.servo.limit
     band = numbers.torque_band(run, motor)
 
-    if band is not None and limit is not None and limit <= IN_VIEW * largest:
+    if band is not None and limit is not None and limit <= numbers.IN_VIEW * largest:
         for edge in band:
             draw.line(ax, time, 1e3 * edge, "muted", ls="-.", lw=1.0)
-            room = max(room, 1.05e3 * float(np.abs(edge).max()))
+            room = max(room, 1.05e3 * float(np.abs(edge[window]).max()))
 
     draw.shade_unmeasured(ax, run)
     levels = f"RMS {shown('load.torque_rms.A', rms)}, peak {shown('load.torque_peak.A', peak)}"
     ax.set(ylabel=f"torque {motor} [mN m]", ylim=(-room, room))
     ax.set_title(f"{motor}: {levels}, share {shown('load.share_A', part)}", loc="left")
+    return axes.mark_cut(ax, run, tau)
 
 
 def load_share(run: StoredRun) -> Drawn:
@@ -170,18 +200,18 @@ def ground_contact(run: StoredRun) -> Drawn | None:
     time = run.record["time"]
     stands = ground.stands(run.record)
     height = 1e3 * ground.height(run.scenario.leg, run.record)
-    figure, axes = draw.panels(3, 2, height=4.4)
+    figure, both = draw.panels(3, 2, height=4.4)
 
     for name, axis in (("force", "z"), ("muted", "x")):
         values: Array = run.record[f"ground_{axis}"]
-        draw.line(axes[0], time, values, name, label=f"force along {axis}")
+        draw.line(both[0], time, values, name, label=f"force along {axis}")
 
-    draw.line(axes[1], time, height, "ink")
-    for ax in axes:
+    draw.line(both[1], time, height, "ink")
+    for ax in both:
         draw.shade_stance(ax, time, stands)
 
-    axes[0].set(ylabel="force on the foot [N]")
-    axes[1].set(ylabel="foot height [mm]", xlim=(0.0, time[-1]))
+    both[0].set(ylabel="force on the foot [N]")
+    both[1].set(ylabel="foot height [mm]", xlim=(0.0, time[-1]))
     figure.legend(loc="outside upper center", ncols=2)
     share = shown("ground.stance_share", look_up(run.metrics, "ground.stance_share"))
 

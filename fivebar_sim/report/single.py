@@ -11,7 +11,7 @@ from fivebar_sim.checks import is_finite
 from fivebar_sim.metrics import guards, tracking
 from fivebar_sim.metrics.catalogue import SHOWN, shown
 from fivebar_sim.metrics.limits import bounds, look_up
-from fivebar_sim.report import html, in_plane, numbers, over_time
+from fivebar_sim.report import html, in_plane, motors, numbers, over_time
 from fivebar_sim.report.draw import Drawn
 from fivebar_sim.report.html import plain, text
 from fivebar_sim.runs.stored import StoredRun
@@ -24,8 +24,13 @@ def figures(run: StoredRun) -> list[Drawn]:
         in_plane.foot_path(run),
         in_plane.leg_moments(run),
         over_time.tracking_error(run),
-        over_time.load_share(run),
+        over_time.error_parts(run),
         over_time.torque(run),
+        motors.angles(run),
+        motors.speeds(run),
+        motors.power(run),
+        motors.torque_speed(run),
+        over_time.load_share(run),
         over_time.ground_contact(run),
         over_time.loop_gap(run),
     ]

@@ -1,0 +1,144 @@
+"""Figures of the motors: angles and setpoints, speeds, power, torque against speed."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from fivebar_sim.arrays import Array
+from fivebar_sim.metrics.catalogue import shown
+from fivebar_sim.metrics.limits import look_up
+from fivebar_sim.report import axes, draw, numbers
+from fivebar_sim.report.draw import Drawn
+from fivebar_sim.report.look import WIDTH, colour
+from fivebar_sim.runs.stored import StoredRun
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+
+def angles(run: StoredRun) -> Drawn:
+    """Draw the angles of both motors with what they were sent."""
+    figure, both = draw.panels(1, 1, height=4.6)
+    sent = numbers.drive(run) == "position"
+    cut = False
+
+    for ax, motor in zip(both, "AE", strict=True):
+        lines = {"angle": np.degrees(run.record[f"theta_{motor}"])}
+        draw.line(ax, run.record["time"], lines["angle"], motor, lw=2.4, label=f"angle {motor}")
+        if sent:
+            lines["setpoint"] = np.degrees(run.record[f"ctrl_{motor}"])
+            label = "setpoints" if motor == "E" else None
+            draw.line(ax, run.record["time"], lines["setpoint"], "ink", lw=0.9, label=label)
+        cut |= _over_time(ax, run, f"angle {motor} [deg]", *lines.values())
+
+    figure.legend(loc="outside upper center", ncols=3)
+    what = "and the setpoints that the servos got (thin)" if sent else "driven by torque"
+    return Drawn(
+        "angles",
+        "Joint angles",
+        f"The angles of L1 at A and of L4 at E from the x axis, {what}.{axes.CUT * cut}",
+        f"Lines of the angles of A and E over time, {what}.",
+        figure,
+    )
+
+
+def speeds(run: StoredRun) -> Drawn:
+    """Draw the speeds of both motors."""
+    figure, (ax,) = draw.panels(1, height=2.9)
+    lines = {motor: run.record[f"theta_dot_{motor}"] for motor in "AE"}
+    cut = _both(ax, run, "speed [rad/s]", lines)
+    figure.legend(loc="outside upper center", ncols=2)
+    window = run.scenario.window
+    most = " and ".join(f"{np.abs(lines[motor][window]).max():.3g} rad/s" for motor in "AE")
+    no_load = run.scenario.servo.speed
+    line = "" if no_load is None else f" The servo turns at {no_load:.3g} rad/s without load."
+    return Drawn(
+        "speeds",
+        "Motor speeds",
+        f"The rates of A and E; at most {most} in the measured time.{line}{axes.CUT * cut}",
+        f"Lines of the speeds of A and E over time; at most {most}.",
+        figure,
+    )
+
+
+def power(run: StoredRun) -> Drawn:
+    """Draw the mechanical power of both motors."""
+    figure, (ax,) = draw.panels(1, height=2.9)
+    given = {motor: numbers.power(run, motor) for motor in "AE"}
+    scale, unit = (1.0, "W") if np.abs(list(given.values())).max() >= 1.0 else (1e3, "mW")
+    cut = _both(ax, run, f"power [{unit}]", {m: scale * watts for m, watts in given.items()})
+    ax.axhline(0.0, color=colour("muted"), lw=0.8)
+    figure.legend(loc="outside upper center", ncols=2)
+    work = " and ".join(
+        shown("load.work.A.net", look_up(run.metrics, f"load.work.{motor}.net")) for motor in "AE"
+    )
+    return Drawn(
+        "power",
+        "Motor power",
+        f"Torque times speed: above 0 the motor drives, below it brakes. A and E gave {work} in "
+        f"the measured time.{axes.CUT * cut}",
+        f"Lines of the mechanical power of A and E over time; they gave {work}.",
+        figure,
+    )
+
+
+def torque_speed(run: StoredRun) -> Drawn:
+    """Draw torque against speed in the measured time, inside what the servo can give."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(WIDTH, 2.9), layout="constrained")
+    ax = figure.add_subplot()
+    window = run.scenario.window
+    fastest = 0.0
+    largest = 0.0
+    for motor in "AE":
+        speed = run.record[f"theta_dot_{motor}"][window]
+        torque = 1e3 * run.record[f"torque_{motor}"][window]
+        rows = np.union1d(draw.envelope(speed), draw.envelope(torque))
+        ax.plot(speed[rows], torque[rows], color=colour(motor), lw=1.2, label=f"motor {motor}")
+        fastest = max(fastest, float(np.abs(speed).max()))
+        largest = max(largest, float(np.abs(torque).max()))
+
+    fastest = 1.1 * fastest or 1.0
+    note = _torque_speed_line(ax, run, fastest, 1e-3 * largest)
+    ax.set(xlabel="speed [rad/s]", ylabel="torque [mN m]", xlim=(-fastest, fastest))
+    figure.legend(loc="outside upper center", ncols=3)
+    return Drawn(
+        "torque-speed",
+        "Torque against speed",
+        f"Each motor's torque at its speed, in the measured time.{note}",
+        f"The motors' torque against their speed; at most {largest:.3g} mN m.{note}",
+        figure,
+    )
+
+
+def _torque_speed_line(ax: Axes, run: StoredRun, fastest: float, largest: float) -> str:
+    """Draw the torque that a servo has at each speed, if it is near; return a sentence about it."""
+    limit = run.scenario.servo.limit
+    if limit is None:
+        return " The servo has no limit."
+    said = f"{shown('load.torque_peak.A', limit)} at rest"
+    if limit > numbers.IN_VIEW * largest:
+        return f" The servo's limit, {said}, is outside the picture."
+
+    ends = np.array([-fastest, fastest])
+    low, high = numbers.band_at(run, ends)
+    for edge, label in ((low, None), (high, "servo's limit")):
+        ax.plot(ends, 1e3 * edge, "-.", color=colour("muted"), lw=1.2, label=label)
+    return f" Dash-dotted: the most that the servo gives at each speed, {said}."
+
+
+def _both(ax: Axes, run: StoredRun, label: str, lines: dict[str, Array]) -> bool:
+    """Draw a line of each motor over time; return whether one is cut."""
+    for motor, values in lines.items():
+        draw.line(ax, run.record["time"], values, motor, label=f"motor {motor}")
+    return _over_time(ax, run, label, *lines.values())
+
+
+def _over_time(ax: Axes, run: StoredRun, label: str, *lines: Array) -> bool:
+    """Scale axes over time by what is measured; return whether a line is cut."""
+    draw.shade_unmeasured(ax, run)
+    ax.set(ylabel=label, ylim=axes.measured_range(run, *lines))
+    return axes.mark_cut(ax, run, *lines)
