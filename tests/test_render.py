@@ -23,9 +23,9 @@ from fivebar_sim.errors import ConfigError, RunDirectoryError
 from fivebar_sim.files import resources
 from fivebar_sim.metrics import JOINT_COLUMNS, Record
 from fivebar_sim.model import HIP_HEIGHT
+from fivebar_sim.render import caption, gl
 from fivebar_sim.render import film as render
 from fivebar_sim.render import frames as render_files
-from fivebar_sim.render import gl
 from fivebar_sim.render import scene as render_scene
 from fivebar_sim.render.replay import Replay, Span, replay
 from fivebar_sim.scenario import Scenario
@@ -87,6 +87,7 @@ def pixel(drawn: render.Stage, point: np.ndarray, size: tuple[int, int]) -> tupl
     """Return (row, column) of a point (x, z) [m], by a pinhole camera of its own."""
     camera = drawn.camera
     width, height = size
+    height -= caption.strip_height(*size)
     ray = np.array([point[0], 0.0, point[1]]) - camera.eye
     right = np.array([1.0, 0.0, 0.0])
     forward = camera.forward
@@ -130,6 +131,7 @@ def test_links_and_target_are_where_kinematics_has_them(name: str, scene: str) -
         near = frame[row - 2 : row + 3, column - 2 : column + 3].astype(int)
         green = near[..., 1] - np.maximum(near[..., 0], near[..., 2])
         assert green.max() > 40, (name, scene)
+    frame = frame[: -caption.strip_height(*size)]
     edge = np.concatenate([frame[[0, -1]].reshape(-1, 3), frame[:, [0, -1]].reshape(-1, 3)])
     assert not (is_link(edge, BLUE) | is_link(edge, ORANGE)).any()  # nothing is cut off
 
@@ -150,10 +152,62 @@ def test_ground_pushes_the_foot_with_an_arrow() -> None:
 
 
 @pytest.mark.usefixtures("drawing")
+@pytest.mark.parametrize("name", ["classic", "minitaur"])
+def test_letters_scale_and_time_are_in_a_picture(name: str) -> None:
+    """A stands left of its motor in blue, E right of its own in orange, also where both are one."""
+    leg = FiveBar.load(name)
+    size = (640, 480)
+    shown = posed(leg, "rail")
+    strip = caption.strip_height(*size)
+    with render.stage(shown, *size) as drawn:
+        early, late = (drawn.frame(time) for time in (0.1, 0.4))
+        again = drawn.frame(0.4)
+        length = drawn.camera.scale(size[1] - strip) * caption.round_length(
+            caption.BAR * size[0] / drawn.camera.scale(size[1] - strip)
+        )
+        for base, side, channels in zip(
+            kinematics.bases(leg), (-1, 1), (BLUE, ORANGE), strict=True
+        ):
+            row, column = pixel(drawn, base + np.array([0.0, shown.hip[0]]), size)
+            beside = early[row - 9 : row + 10, slice(*sorted((column, column + side * 60)))]
+            paper = (beside == 255).all(axis=-1)
+            assert paper.any()
+            # the letter is on the paper: between its first and last column
+            inside = beside[:, paper.any(axis=0)]
+            assert is_link(inside, channels).any()
+    np.testing.assert_array_equal(late, again)
+    below = np.s_[-strip:]
+    dark = early[below].max(axis=-1) < 120
+    edges = [np.flatnonzero(np.diff([0, *line, 0])).reshape(-1, 2) for line in dark]
+    widest = max(int(np.diff(each).max(initial=0)) for each in edges)
+    assert widest == pytest.approx(length, abs=2.5)
+    changed = (early[below] != late[below]).any(axis=(0, 2))
+    assert 0 < np.flatnonzero(changed)[-1] < 120  # the time, and nothing beside it
+
+
+def test_legend_explains_what_is_there() -> None:
+    air = caption.legend(posed(FiveBar.load("classic")))
+    assert [entry.colour for entry in air] == ["target", "foot"]
+    grounded = caption.legend(posed(FiveBar.load("classic"), "rail"))
+    assert [entry.colour for entry in grounded] == ["target", "foot", "force"]
+    assert grounded[-1].label == "ground, max 5 N"
+    assert air[1].label == "foot, last 0.2 s"  # 0.8 of a period of 0.25 s
+
+
+@pytest.mark.parametrize(
+    ("most", "length"), [(0.0199, 0.01), (0.02, 0.02), (0.049, 0.02), (0.05, 0.05), (1.3, 1.0)]
+)
+def test_scale_bars_are_1_2_or_5(most: float, length: float) -> None:
+    assert caption.round_length(most) == pytest.approx(length)
+
+
+@pytest.mark.usefixtures("drawing")
 def test_marks_of_the_belt_are_back_in_place_after_a_period() -> None:
     shown = posed(FiveBar.load("classic"), "treadmill", steps=1000)  # nothing else moves
     with render.stage(shown, 200, 150) as drawn:
-        before, within, after = (drawn.frame(t).astype(int) for t in (0.6, 0.7, 0.85))
+        # the strip below says the time, which goes on
+        leg = np.s_[: -caption.strip_height(200, 150)]
+        before, within, after = (drawn.frame(t)[leg].astype(int) for t in (0.6, 0.7, 0.85))
     assert np.abs(after - before).max() < 20 < np.abs(within - before).max()
 
 

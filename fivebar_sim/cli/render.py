@@ -23,6 +23,9 @@ def render(
 ) -> int:
     """Draw a run: the leg, its target path, the foot's trail and the ground's force.
 
+    The motors have their letters, A and E; below the leg are the time, a scale bar and what the
+    colours mean, as far as they fit.
+
     A .gif shows the last whole period of a periodic path and repeats without a jump; a .mp4 (which
     needs the program ffmpeg) shows the whole run; a .png shows one moment.
 

@@ -16,8 +16,8 @@ import numpy as np
 from fivebar_sim.checks import check_number
 from fivebar_sim.errors import ConfigError
 from fivebar_sim.files import whole_file
+from fivebar_sim.render import caption, gl, scene
 from fivebar_sim.render import frames as render_files
-from fivebar_sim.render import gl, scene
 from fivebar_sim.render.frames import Frame
 from fivebar_sim.render.replay import Replay, Span
 
@@ -139,7 +139,7 @@ def write(replay: Replay, out: Path, film: Film) -> int:
 
 
 class Stage:
-    """A GL context with a scene and a camera, which draws the moments of a run.
+    """A GL context with a scene and a camera, which draws the moments of a run with a caption.
 
     Args:
         replay: The run.
@@ -148,9 +148,11 @@ class Stage:
     """
 
     def __init__(self, replay: Replay, width: int, height: int) -> None:
-        self.camera = scene.fit(replay, width / height)
+        seen = height - caption.strip_height(width, height)
+        self.camera = scene.fit(replay, width / seen)
+        self._caption = caption.Caption(replay, self.camera, width, height)
         self._replay = replay
-        self._rect = mujoco.MjrRect(0, 0, width, height)
+        self._rect = mujoco.MjrRect(0, 0, width, seen)
         scene.dress(replay, self.camera, max(width, height))
         model = replay.model
         # MjrContext allocates its offscreen buffer by these, so they are set before it is made.
@@ -190,7 +192,7 @@ class Stage:
         mujoco.mjr_readPixels(pixels, None, self._rect, self._mjr)
 
         # GL counts rows from the bottom, image files from the top.
-        return np.ascontiguousarray(pixels[::-1])
+        return self._caption.write(np.ascontiguousarray(pixels[::-1]), row)
 
     def close(self) -> None:
         """Free the GL context."""

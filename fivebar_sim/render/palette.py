@@ -23,6 +23,9 @@ class Shades(NamedTuple):
     word: str
 
 
+PAPER = Shades("#ffffff", "#15181d", "white")
+"""The page itself."""
+
 COLOURS = {
     "ink": Shades("#24292f", "#d7dce2", "black"),
     "muted": Shades("#68717b", "#959eaa", "grey"),

@@ -63,6 +63,28 @@ class Camera(NamedTuple):
         """Position of the camera [m], (3,)."""
         return self.centre - self.distance * self.forward
 
+    def scale(self, height: float) -> float:
+        """Return how many pixels a metre in the leg plane has at the centre of a picture.
+
+        Args:
+            height: Height of the picture [pixels].
+        """
+        return float(0.5 * height / np.tan(np.radians(0.5 * self.field)) / self.distance)
+
+    def pixel(self, point: Array, width: int, height: int) -> tuple[float, float]:
+        """Return where a point of the leg plane is in a picture: x from the left, y from the top.
+
+        Args:
+            point: The point (x, z) [m], (2,).
+            width: Width of the picture [pixels].
+            height: Height of the picture [pixels].
+        """
+        ray = np.array([point[0], 0.0, point[1]]) - self.eye
+        right = np.array([1.0, 0.0, 0.0])
+        up = np.cross(right, self.forward)
+        scale = self.scale(height) * self.distance / (ray @ self.forward)
+        return float(0.5 * width + scale * (ray @ right)), float(0.5 * height - scale * (ray @ up))
+
     def aim(self, camera: mujoco.MjvCamera) -> None:
         """Set position and direction of MuJoCo's free camera; the model has the field of view."""
         camera.type = mujoco.mjtCamera.mjCAMERA_FREE
@@ -180,10 +202,18 @@ def _path(replay: Replay) -> Array:
     return replay.target[[replay.row(time) for time in times]]
 
 
+def trail_seconds(replay: Replay) -> float:
+    """Return the duration of the foot's trail in a run [s]."""
+    return min(TRAIL_SECONDS, 0.8 * (replay.scenario.path.period or np.inf))
+
+
 def _trail(replay: Replay, row: int) -> Array:
     """Return the foot's positions before a row, oldest first [m], (n, 2)."""
-    seconds = min(TRAIL_SECONDS, 0.8 * (replay.scenario.path.period or np.inf))
-    back = seconds / replay.scenario.sim.timestep * np.linspace(1.0, 0.0, TRAIL_PARTS + 1)
+    back = (
+        trail_seconds(replay)
+        / replay.scenario.sim.timestep
+        * np.linspace(1.0, 0.0, TRAIL_PARTS + 1)
+    )
     return replay.foot[np.maximum(row - np.round(back).astype(int), 0)]
 
 

@@ -19,7 +19,7 @@ from fivebar_sim.render import palette
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-PAPER = ("#ffffff", "#15181d")
+PAPER = (palette.PAPER.light, palette.PAPER.dark)
 """The page itself, in light and in dark."""
 
 COLOURS = {
