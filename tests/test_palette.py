@@ -20,6 +20,7 @@ ROOT = Path(__file__).resolve().parents[1]
 ALLOWED = {
     "fivebar_sim/render/palette.py": "the palette",
     "fivebar_sim/report/look.py": "paper, and what lies behind the lines",
+    "fivebar_sim/report/workspace_map.py": "the ground of a map, behind the lines",
     "fivebar_sim/recording/web.py": "the page around Rerun's viewer",
 }
 """The files of the package that may name a colour by its number."""

@@ -36,22 +36,27 @@ class Map(NamedTuple):
         return cell * float((self.distance >= 0.0).sum())
 
 
-def survey(leg: FiveBar, cells: int = CELLS) -> Map:
+def survey(leg: FiveBar, cells: int = CELLS, path: Array | None = None) -> Map:
     """Return the map of a leg's whole workspace.
 
     Args:
         leg: The leg.
         cells: Grid points along x and along z.
+        path: Points that shall be on the map too [m], (n, 2).
     """
     A, _ = kinematics.bases(leg)
     # A little more than the foot can ever reach, whatever the angles.
     reach = 1.05 * (leg.L1 + leg.L2 + leg.L6 + float(np.hypot(*A)))
+    seen = np.zeros((1, 2)) if path is None else path
+    reach = max(reach, 1.05 * float(np.abs(seen).max()))
     line = np.linspace(-reach, reach, cells)
     foot = np.stack(np.meshgrid(line, line), axis=-1)
     distance = region.distance(leg, foot, mode=leg.mode)
     within = distance > 0.0
-    rows = _span(np.any(within, axis=1))
-    columns = _span(np.any(within, axis=0))
+    columns, rows = (
+        _span(np.any(within, axis=axis) | ((least <= line) & (line <= most)))
+        for axis, least, most in zip((0, 1), seen.min(axis=0), seen.max(axis=0), strict=True)
+    )
     return Map(line[columns], line[rows], distance[rows, columns])
 
 
