@@ -76,7 +76,7 @@ def test_shipped_scenarios_pass_their_baselines_whole(shell: Shell) -> None:
         ("leg.L2=0.0606", "torque A RMS"),
         ("path.frequency=4.4", "tracking RMS"),
         ("path.radii=[0.02,0.0088]", "tracking RMS"),
-        ("sim.integrator=implicitfast", "loop gap RMS"),
+        ("sim.integrator=implicitfast", "loop gap RMS (run)"),
         ("leg.armature=2e-5", "torque A RMS"),
     ],
 )

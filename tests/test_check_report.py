@@ -61,7 +61,7 @@ def test_junit_has_a_case_for_each_run_and_metric() -> None:
     }
     said = {key: out.text for key, case in cases.items() for out in case.iter("system-out")}
     assert said == {
-        ("one", "run"): "better than its baseline: loop gap max; --update records it\nmind",
+        ("one", "run"): "better than its baseline: loop gap max (run); --update records it\nmind",
         ("one", "closure.max"): "loop gap max: less",
         ("one", "closure.rms"): "loop gap RMS: moved",
     }
@@ -84,7 +84,7 @@ def test_markdown_tells_failures_first_and_every_metric() -> None:
     assert lines[2:7] == [
         "- **FAIL** one: tracking RMS: worse",
         "- **FAIL** one: why",
-        "- **note** one: better than its baseline: loop gap max; --update records it",
+        "- **note** one: better than its baseline: loop gap max (run); --update records it",
         "- **note** one: mind",
         "- **FAIL** two: it broke",
     ]

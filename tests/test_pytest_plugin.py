@@ -175,7 +175,7 @@ def test_range(leg_run):
     assert re.search(
         r"AssertionError: short fails:\nE +tracking RMS: [\d.]+ mm, limit <= 1 um\n", said
     )
-    assert re.search(r"E +loop gap max: [\d.]+ um, limit <= 1 nm\n", said)
+    assert re.search(r"E +loop gap max \(run\): [\d.]+ um, limit <= 1 nm\n", said)
     assert re.search(r"E +load share A: [\d.]+ %, limit >= 90 %\n", said)
     assert re.search(r"E +guard branch: the leg left its branch at t = [\d.]+ s\n", said)
     assert "leg_run.py" not in said  # the traceback is the test's alone

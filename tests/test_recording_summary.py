@@ -16,25 +16,26 @@ LIMITS = {"tracking.rms": (-math.inf, 1e-3), "closure.max": (0.0, 1e-6), "load.s
 
 def test_one_run_has_its_limits_its_metrics_and_its_provenance() -> None:
     lines = summary(["trot"], [MEASURED], [LIMITS]).splitlines()
-    assert lines[:14] == [
+    assert lines[:15] == [
         "## trot: FAIL",
         "",
         "| limit | allowed | value | verdict |",
         "|:--|--:|--:|:--|",
         "| tracking RMS | <= 1 mm | 0.1235 mm | pass |",
-        "| loop gap max | 0 to 1 um | 3 um | **FAIL** |",
+        "| loop gap max (run) | 0 to 1 um | 3 um | **FAIL** |",
         "| load share A | 40 to 60 % | undefined | **FAIL** |",
         "",
         "| metric | value |",
         "|:--|--:|",
         "| tracking RMS | 0.1235 mm |",
         "| tracking max | 0.3 mm |",
-        "| loop gap RMS | 0.1 um |",
-        "| loop gap max | 3 um |",
+        "| loop gap RMS (run) | 0.1 um |",
+        "| loop gap max | undefined |",
+        "| loop gap max (run) | 3 um |",
     ]
     assert lines[-4:] == [
-        "| branch flips | 0 |",
-        "| MuJoCo warnings | 0 |",
+        "| branch flips (run) | 0 |",
+        "| MuJoCo warnings (run) | 0 |",
         "",
         "*trot: mujoco 3.17, seed 0*",
     ]
@@ -48,7 +49,7 @@ def test_several_runs_stand_side_by_side() -> None:
     assert lines[:3] == ["## a \\| b: FAIL", "", "No limits set: guards alone can fail the run."]
     assert "## calm: PASS" in lines
     assert "| metric | a \\| b | calm |" in lines
-    assert "| loop gap RMS | 0.1 um | 2 um |" in lines
+    assert "| loop gap RMS (run) | 0.1 um | 2 um |" in lines
     assert "| slip in stance |  | 1 mm |" in lines
 
 

@@ -129,7 +129,7 @@ def test_failures_say_how_far_and_remarks_what_else() -> None:
     here = result(measured)
     checked = comparison.compare(here, then)
     assert checked.failures == ["tracking RMS: 1.1 mm, baseline 1 mm (+10.0 %; 5.001 um allowed)"]
-    assert checked.remarks == ["better than its baseline: loop gap max; --update records it"]
+    assert checked.remarks == ["better than its baseline: loop gap max (run); --update records it"]
     here = result(measured, provenance=PROVENANCE | {"mujoco": "3.18.0"})
     note = "its baseline was made with mujoco 3.17.0, now 3.18.0"
     assert comparison.compare(here, then).notes == [note]

@@ -12,9 +12,10 @@ from rich.measure import Measurement
 from rich.table import Table
 
 from fivebar_sim.metrics import guards
-from fivebar_sim.metrics.catalogue import DETAILS, HIDDEN_AT_ZERO, SHOWN, shown
-from fivebar_sim.metrics.limits import bounds, look_up
+from fivebar_sim.metrics.catalogue import SHOWN, shown
+from fivebar_sim.metrics.limits import bounds
 from fivebar_sim.metrics.measured import NOT_JUDGED
+from fivebar_sim.runs.side_by_side import side_by_side
 
 if TYPE_CHECKING:
     from fivebar_sim.regression.comparison import Checked, Row
@@ -41,16 +42,17 @@ def verdict(ok: bool) -> str:
 
 def print_result(result: Result, where: str, console: Console) -> None:
     """Print one run: its metrics with their limits, the verdict, and the run directory."""
+    window = result.measured.window
+    title = (
+        f"{result.scenario.name}: {result.scenario.leg.name} leg, "
+        f"window {window.begin:.4g} to {window.end:.4g} s"
+    )
+    columns = ("metric", "window", "whole run", "limit", "verdict")
+    table = _table(escape(title), columns)
     limits = {limit.key: limit for limit in result.limits}
-    title = f"{result.scenario.name}: {result.scenario.leg.name} leg"
-    table = _table(escape(title), ("metric", "value", "limit", "verdict"))
-    for key, (label, _, _) in SHOWN.items():
-        limit = limits.get(key)
-        # Runs in the air have no table `ground`; a metric with a limit is always shown.
-        if key.split(".")[0] not in result.metrics or not (limit or _matters(key, result)):
-            continue
-        judged = (bounds(limit), verdict(limit.ok)) if limit else ("", "")
-        table.add_row(label, shown(key, look_up(result.metrics, key)), *judged)
+    for row in side_by_side(result.metrics, limits):
+        judged = (row.limit, verdict(row.ok)) if row.limit else ("", "")
+        table.add_row(row.label, row.window, row.run, *judged)
 
     console.print(table)
     for said in guards.tripped(result.measured.guards):
@@ -62,17 +64,11 @@ def print_result(result: Result, where: str, console: Console) -> None:
     console.print(f"verdict: {WORDS[result.verdict]}   written to {escape(where)}", soft_wrap=True)
 
 
-def _matters(key: str, result: Result) -> bool:
-    """Return whether to show a metric that has no limit."""
-    if key in HIDDEN_AT_ZERO:
-        return bool(look_up(result.metrics, key))
-    return key not in DETAILS
-
-
 def print_check(checked: Sequence[Checked], console: Console) -> None:
     """Print many runs as one table, each name above its metrics; then failures and notes."""
     columns = ("metric", "limit", "baseline", "now", "change", "verdict")
-    table = _table("foot tracking and load against limits and baselines", columns, gap=0)
+    title = "limits and baselines; (run): over the whole run, all else over the window"
+    table = _table(title, columns)
     for each in checked:
         table.add_row(f"[bold]{escape(each.name)}[/bold]")
         for row in each.rows:
@@ -138,9 +134,9 @@ def _word(row: Row) -> str:
     return verdict(row.verdict == "pass") if plain else f"[cyan]{row.verdict}[/cyan]"
 
 
-def _table(title: str, columns: Sequence[str], gap: int = 1) -> Table:
+def _table(title: str, columns: Sequence[str]) -> Table:
     """Return an empty table: numbers aligned right, no wrapping, for 80 columns."""
-    table = Table(title=title, box=box.SIMPLE_HEAD, title_justify="left", padding=(0, gap, 0, 0))
+    table = Table(title=title, box=box.SIMPLE_HEAD, title_justify="left", padding=0)
     for column in columns:
         number = column not in ("metric", "verdict", "")
         table.add_column(column, justify="right" if number else "left", no_wrap=True)

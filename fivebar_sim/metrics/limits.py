@@ -49,6 +49,16 @@ def look_up(metrics: Mapping[str, Any], key: str) -> float | None:
     return value
 
 
+def has(metrics: Mapping[str, Any], key: str) -> bool:
+    """Return whether a run has a metric: one in the air has none of a ground."""
+    value: Any = metrics
+    for part in key.split("."):
+        if part not in value:
+            return False
+        value = value[part]
+    return True
+
+
 def judge(metrics: Mapping[str, Any], limits: Mapping[str, tuple[float, float]]) -> list[Limit]:
     """Return every limit with its value. A metric that is undefined fails its limit."""
     judged = []

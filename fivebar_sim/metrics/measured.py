@@ -14,10 +14,11 @@ import msgspec
 from fivebar_sim.metrics.branch import Branch
 from fivebar_sim.metrics.catalogue import MEASURED, Metric
 from fivebar_sim.metrics.energy import Energy
-from fivebar_sim.metrics.ground import GroundMetrics
+from fivebar_sim.metrics.ground import GroundForce, GroundMetrics
 from fivebar_sim.metrics.guards import Guard
-from fivebar_sim.metrics.json_types import LARGEST, Count, Table
+from fivebar_sim.metrics.json_types import LARGEST, Amount, Count, Motors, Table
 from fivebar_sim.metrics.limits import Limit, WrittenLimit
+from fivebar_sim.metrics.peaks import Peaks, Whole, Window
 from fivebar_sim.metrics.sharing import Load
 
 Verdict = Literal["pass", "fail", "not judged"]
@@ -31,9 +32,18 @@ class Measured(Table, frozen=True, kw_only=True, dict=True):
 
     The tables of metrics with a function of their own, such as `tracking`, are known from the
     catalogue alone: they are fields of the classes that `of` and `read` return.
+
+    The peaks of `Peaks` are those of the measured window; `whole` has those of the whole run.
     """
 
+    window: Window
     load: Load
+    torque_peak: Motors
+    speed_peak: Motors
+    power_peak: Motors
+    gap_peak: Amount
+    ground_peak: GroundForce | msgspec.UnsetType = msgspec.UNSET
+    whole: Whole
     energy: Energy
     branch: Branch
     guards: list[Guard]
@@ -57,7 +67,10 @@ class Judged(Measured, frozen=True, kw_only=True):
 def of(
     rows: Mapping[str, Mapping[str, float | None]],
     *,
+    window: Window,
     load: Load,
+    peaks: Peaks,
+    whole: Whole,
     energy: Energy,
     branch: Branch,
     guards: list[Guard],
@@ -68,7 +81,10 @@ def of(
 
     Args:
         rows: What the functions of the catalogue gave, by table and name.
+        window: What most of it was measured over.
         load: How the motors shared the load.
+        peaks: The peaks of the window.
+        whole: The peaks of the whole run.
         energy: Where the energy came from and went.
         branch: Which way the leg was folded.
         guards: Every guard of the run.
@@ -80,7 +96,8 @@ def of(
     for table, values in rows.items():
         own = msgspec.structs.asdict(tables[table]) if table in tables else {}
         tables[table] = KINDS[table](**own, **values)
-    return MeasuredRows(**tables, guards=guards, warnings=warnings)
+    tables |= msgspec.structs.asdict(peaks)
+    return MeasuredRows(**tables, window=window, whole=whole, guards=guards, warnings=warnings)
 
 
 def with_verdict(

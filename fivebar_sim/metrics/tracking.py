@@ -1,4 +1,4 @@
-"""The distance of the foot from its path, and when it left it or was lost."""
+"""How far the foot was from its path and when it left it, and how far the loop was open at C."""
 
 from __future__ import annotations
 
@@ -69,6 +69,18 @@ def largest(leg: FiveBar, record: Mapping[str, Array], window: slice) -> float:
     """Return the largest tracking error of the window [m]."""
     del leg
     return float(tracking_error(record)[window].max())
+
+
+def gap_rms(leg: FiveBar, record: Mapping[str, Array], window: slice) -> float:
+    """Return the root of the mean squared gap at C [m]."""
+    del leg
+    return root_mean_square(record["gap"][window])
+
+
+def gap_max(leg: FiveBar, record: Mapping[str, Array], window: slice) -> float:
+    """Return the largest gap at C [m]."""
+    del leg
+    return float(record["gap"][window].max())
 
 
 def root_mean_square(values: Array) -> float:

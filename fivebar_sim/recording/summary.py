@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from fivebar_sim.metrics import guards
-from fivebar_sim.metrics.catalogue import SHOWN, shown
+from fivebar_sim.metrics.catalogue import LISTED, SHOWN, shown
 from fivebar_sim.metrics.limits import Limit, bounds, judge, look_up
 from fivebar_sim.metrics.measured import Judged
 
@@ -32,7 +32,8 @@ def summary(
 
     names = [_cell(label) for label in labels] if len(labels) > 1 else ["value"]
     lines += [f"| metric | {' | '.join(names)} |", f"|:--|{'--:|' * len(names)}"]
-    for key, (name, _, _) in SHOWN.items():
+    for key in LISTED:
+        name = SHOWN[key][0]
         values = [_value(measured.table, key) for measured in found]
         if any(values):
             lines.append(f"| {name} | {' | '.join(values)} |")

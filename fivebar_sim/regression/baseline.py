@@ -32,7 +32,7 @@ from fivebar_sim.checks import check_number
 from fivebar_sim.errors import ConfigError
 from fivebar_sim.files import input_file, resources, tables, whole_file
 from fivebar_sim.metrics.catalogue import ABSOLUTE
-from fivebar_sim.metrics.limits import look_up
+from fivebar_sim.metrics.limits import has, look_up
 
 RELATIVE = 0.005
 """By what part of its recorded value a metric may move."""
@@ -101,7 +101,7 @@ def record(metrics: Mapping[str, Any], old: Baseline | None = None) -> Baseline:
     kept = old.metrics if old else {}
     recorded = {}
     for key in sorted(ABSOLUTE):
-        if key.split(".")[0] in metrics:
+        if has(metrics, key):
             value = look_up(metrics, key)
             # Six digits: differences between machines are beyond them.
             rounded = None if value is None else float(f"{value:.6g}")

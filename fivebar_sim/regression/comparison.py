@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from fivebar_sim.metrics import guards
 from fivebar_sim.metrics.catalogue import LESS_IS_BETTER, SHOWN, shown
-from fivebar_sim.metrics.limits import Limit, bounds, look_up
+from fivebar_sim.metrics.limits import Limit, bounds, has, look_up
 from fivebar_sim.regression.baseline import Baseline, Recorded
 
 if TYPE_CHECKING:
@@ -124,7 +124,7 @@ def _row(
 ) -> Row:
     """Return one metric; a broken limit outranks any difference to the baseline."""
     # A baseline may still name metrics of a ground that the scene no longer has.
-    now = look_up(metrics, key) if key.split(".")[0] in metrics else None
+    now = look_up(metrics, key) if has(metrics, key) else None
     label = SHOWN[key][0]
     verdict = PASS
     why = ""

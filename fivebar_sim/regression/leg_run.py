@@ -16,7 +16,7 @@ from fivebar_sim.files import tables
 from fivebar_sim.metrics import guards
 from fivebar_sim.metrics.catalogue import LIMIT_KEYS, SHOWN, shown
 from fivebar_sim.metrics.columns import Record
-from fivebar_sim.metrics.limits import Limit, bounds, judge
+from fivebar_sim.metrics.limits import Limit, bounds, has, judge
 from fivebar_sim.metrics.measured import Verdict
 from fivebar_sim.regression import comparison
 from fivebar_sim.rollout import Result
@@ -92,7 +92,7 @@ class LegRun:
         """
         __tracebackhide__ = True
         # A scene without a ground has no metrics of one.
-        known = [each for each in LIMIT_KEYS if each.split(".")[0] in self.metrics]
+        known = [each for each in LIMIT_KEYS if has(self.metrics, each)]
         if key not in known:
             raise ArgumentError(unknown("metric", key, known))
         if low is None and high is None:

@@ -12,7 +12,7 @@ from fivebar_sim.control import Feedback
 from fivebar_sim.control.servo import Drive
 from fivebar_sim.files import tables
 from fivebar_sim.metrics import load
-from fivebar_sim.metrics.catalogue import GROUND_KEYS, SHOWN
+from fivebar_sim.metrics.catalogue import GROUND_KEYS, LISTED, SHOWN
 from fivebar_sim.metrics.columns import motors
 from fivebar_sim.metrics.limits import Limit, judge
 from fivebar_sim.metrics.tracking import tracking_error
@@ -34,9 +34,13 @@ def name_of(run: StoredRun) -> str:
 
 
 def keys(run: StoredRun) -> list[str]:
-    """Return the keys of the metrics that a run has in its scene, in reading order."""
+    """Return the keys of the metrics to list of a run, in reading order.
+
+    Those of a ground only where there is one, and those that repeat another if they have a limit.
+    """
     grounded = "ground_z" in run.record
-    return [key for key in SHOWN if grounded or key not in GROUND_KEYS]
+    listed = {*LISTED, *run.scenario.limits}
+    return [key for key in SHOWN if key in listed and (grounded or key not in GROUND_KEYS)]
 
 
 def limits(run: StoredRun) -> list[Limit]:

@@ -43,9 +43,16 @@ def read(file: Path, *, grounded: bool) -> Judged:
     except msgspec.ValidationError as error:
         raise RunDirectoryError(f"{file}: {_explain(str(error), metrics)}") from None
 
-    if grounded == (found.ground is msgspec.UNSET):
-        which = "lacks" if grounded else "must not have"
-        raise RunDirectoryError(f"{file}: a run of this scene {which} the key ground")
+    parts = {
+        "ground": found.ground,
+        "ground_peak": found.ground_peak,
+        "whole.ground_peak": found.whole.ground_peak,
+        "whole.at.ground_peak": found.whole.at.ground_peak,
+    }
+    for key, table in parts.items():
+        if grounded == (table is msgspec.UNSET):
+            which = "lacks" if grounded else "must not have"
+            raise RunDirectoryError(f"{file}: a run of this scene {which} the key {key}")
     return found
 
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from fivebar_sim.arrays import Array, Bools
 from fivebar_sim.kinematics.stops import Ranges
-from fivebar_sim.metrics import branch, catalogue, energy, ground, guards, load, measured
+from fivebar_sim.metrics import branch, catalogue, energy, ground, guards, load, measured, peaks
 from fivebar_sim.metrics.columns import MOTORS, motors
 from fivebar_sim.metrics.json_types import Parts
 from fivebar_sim.metrics.measured import Measured
@@ -46,7 +46,8 @@ def measure(scenario: Scenario, record: Mapping[str, Array], besides: Unrecorded
 
     Tracking, closure and everything else with a function of its own come from `catalogue`; load
     from `load.measure`, where saturated is the fraction of steps in which the torque limit clipped;
-    energy from `energy.measure`. Branch and guards look at every step, the others at the window.
+    peaks from `peaks`; energy from `energy.measure`. What each is measured over, the window or the
+    whole run, stands in its row of the catalogue; guards look at every step.
 
     Args:
         scenario: The scenario that was run.
@@ -75,10 +76,14 @@ def measure(scenario: Scenario, record: Mapping[str, Array], besides: Unrecorded
     )
 
     window = scenario.window
+    h = scenario.sim.timestep
     grounded = "ground_z" in record
     return measured.of(
         catalogue.measure(leg, record, window),
+        window=peaks.Window(begin=window.start * h, end=window.stop * h),
         load=_load(scenario, record, start, saturated),
+        peaks=peaks.measure(record, window),
+        whole=peaks.measure_whole(record),
         energy=energy.measure(balance),
         branch=folded,
         guards=guards.judge(checked),
