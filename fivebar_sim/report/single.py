@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import shlex
+from typing import Any
 
 import msgspec
 import tomli_w
 
 from fivebar_sim.checks import is_finite
 from fivebar_sim.metrics import guards, tracking
-from fivebar_sim.metrics.catalogue import SHOWN, shown
+from fivebar_sim.metrics.catalogue import BY_KEY, SHOWN, shown
 from fivebar_sim.metrics.limits import bounds, look_up
 from fivebar_sim.report import html, in_plane, motors, numbers, over_time
 from fivebar_sim.report.draw import Drawn
 from fivebar_sim.report.html import plain, text
+from fivebar_sim.runs.side_by_side import when
 from fivebar_sim.runs.stored import StoredRun
 
 
@@ -60,8 +62,8 @@ def _head(run: StoredRun) -> str:
         f"The leg {scenario.leg.name} follows a path of kind {scenario.path.__struct_config__.tag} "
         f"in the scene {scenario.scene.kind}, driven by the controller "
         f"{scenario.controller_name}, for {scenario.duration:g} s in steps of {1e3 * h:g} ms. "
-        f"Tracking and load are measured from {window.start * h:.4g} s to {window.stop * h:.4g} s, "
-        f"the loop gap over the whole run."
+        f"Tracking and load are measured in the window from {window.start * h:.4g} s to "
+        f"{window.stop * h:.4g} s, what is called (run) over the whole run."
     )
     tripped = [f'<p class="fail">{text(said)}</p>' for said in guards.tripped(run.measured.guards)]
     remark = tracking.astray(scenario.leg, run.record, window)
@@ -116,6 +118,11 @@ def _load(run: StoredRun) -> str:
     named = {
         "load.torque_rms": "torque RMS",
         "load.torque_peak": "torque peak",
+        "whole.torque_peak": "torque peak (run)",
+        "speed_peak": "speed peak",
+        "whole.speed_peak": "speed peak (run)",
+        "power_peak": "power peak",
+        "whole.power_peak": "power peak (run)",
         "load.work.{}.positive": "work given",
         "load.work.{}.negative": "work taken",
         "load.work.{}.net": "work net",
@@ -124,7 +131,10 @@ def _load(run: StoredRun) -> str:
     rows: list[tuple[str, str, str]] = []
     for key, label in named.items():
         pair = [key.format(m) if "{}" in key else f"{key}.{m}" for m in "AE"]
-        A, E = (shown(each, look_up(run.metrics, each)) for each in pair)
+        A, E = (
+            f"{shown(each, look_up(run.metrics, each))}{when(run.metrics, BY_KEY[each])}"
+            for each in pair
+        )
         rows.append((label, A, E))
 
     for key, label in (("load.share_A", "load share"), ("load.thermal_share_A", "thermal share")):
@@ -133,9 +143,10 @@ def _load(run: StoredRun) -> str:
 
     limit = run.scenario.servo.limit
     if limit is not None:
-        peaks = [look_up(run.metrics, f"load.torque_peak.{motor}") or 0.0 for motor in "AE"]
+        # The servo has to give the peak of the whole run, wherever the window begins.
+        peaks = [look_up(run.metrics, f"whole.torque_peak.{motor}") or 0.0 for motor in "AE"]
         A, E = (shown("load.share_A", peak / limit) for peak in peaks)
-        rows.append((f"peak, of the servo's {shown('load.torque_peak.A', limit)}", A, E))
+        rows.append((f"peak (run), of the servo's {shown('load.torque_peak.A', limit)}", A, E))
 
     fraction, energy = (
         shown(key, look_up(run.metrics, key))
@@ -145,7 +156,12 @@ def _load(run: StoredRun) -> str:
         f"One motor drove while the other braked in {fraction} of the steps; {energy} went from "
         "one to the other."
     )
-    return html.table("Over the measured time.", ("", "A", "E"), rows) + f"\n<p>{text(note)}</p>"
+    window = run.measured.window
+    caption = (
+        f"Over the measured window, {window.begin:.4g} to {window.end:.4g} s; "
+        "(run): over the whole run."
+    )
+    return html.table(caption, ("", "A", "E"), rows) + f"\n<p>{text(note)}</p>"
 
 
 def _phase(run: StoredRun) -> list[str]:
@@ -177,19 +193,30 @@ def _metrics(run: StoredRun) -> str:
         # The load over the cycle has its own table.
         if key.startswith("load.phase."):
             continue
-        # Metrics in stance have the units and words of their namesakes over all steps.
-        alike = key.replace("load.stance.", "load.")
-        label = key.rpartition(".")[2].replace("_", " ")
-        read = plain(value)
-        if alike in SHOWN and (value is None or is_finite(value)):
-            label = SHOWN[alike][0]
-            read = shown(alike, value)
-        label += ", in stance" if alike != key else ""
+        label, read = _words(key, value)
         rows.append((label, read, plain(value), html.key(key)))
 
     return html.table(
-        "As in metrics.json, there in SI units.", ("metric", "value", "SI", "key"), rows
+        "As in metrics.json, there in SI units; (run): over the whole run.",
+        ("metric", "value", "SI", "key"),
+        rows,
     )
+
+
+def _words(key: str, value: Any) -> tuple[str, str]:
+    """Return the name of a number of metrics.json for people, and the number in their unit."""
+    # Metrics in stance have the units and words of their namesakes over all steps.
+    alike = key.replace("load.stance.", "load.")
+    peak = key.replace("whole.at.", "whole.")
+    label = key.rpartition(".")[2].replace("_", " ")
+    if alike in SHOWN and (value is None or is_finite(value)):
+        label = SHOWN[alike][0]
+        return f"{label}, in stance" if alike != key else label, shown(alike, value)
+    if peak in SHOWN:
+        return f"{SHOWN[peak][0]}: when", f"{plain(value)} s"
+    if key.startswith("window."):
+        return f"window, {label}", f"{plain(value)} s"
+    return label + (", in stance" if alike != key else ""), plain(value)
 
 
 def _what(run: StoredRun) -> list[str]:
