@@ -112,6 +112,17 @@ def test_window_of_a_path_without_period_is_all_after_the_ramp(tmp_path: Path) -
     assert loaded.window == slice(100, 600)
 
 
+@pytest.mark.parametrize(
+    ("drop", "start", "stop"), [(0.0, 100, 600), (0.9e-3, 100, 600), (1e-3, 0, 500), (0.5, 0, 500)]
+)
+def test_landing_is_measured_from_its_drop_on(
+    tmp_path: Path, drop: float, start: int, stop: int
+) -> None:
+    """The impact may come before the ramp ends; a foot that falls less than 1 mm just stands."""
+    loaded = scenario(tmp_path, "scene.kind=rail", f"scene.drop={drop}", "duration=0.6")
+    assert loaded.window == slice(start, stop)
+
+
 @pytest.mark.parametrize("name", [*NAMES, "odd"])
 def test_resolved_table_gives_the_same_run(tmp_path: Path, name: str) -> None:
     if name == "odd":

@@ -83,10 +83,13 @@ class Scenario(msgspec.Struct, frozen=True, kw_only=True):
     def window(self) -> slice:
         """The rows that tracking and load are measured over.
 
-        Whole periods after the ramp; for a path that comes to rest, up to that time.
+        Whole periods after the ramp, or from the drop on in a landing; for a path that comes to
+        rest, up to that time.
         """
         h = self.sim.timestep
-        ramp = self.path.ramp
+        # The impact may come before the ramp ends, and is what a landing is run for.
+        landing = isinstance(self.scene, Ground) and self.scene.lands
+        ramp = 0.0 if landing else self.path.ramp
         period = self.path.period
         first = round(ramp / h)
         last = self.steps

@@ -14,6 +14,9 @@ from fivebar_sim.geometry import HEAVIEST, LONGEST
 FASTEST = 1e3
 """Upper end of a belt's speed [m/s]."""
 
+LANDING = 1e-3
+"""A drop from this height on is a landing [m]: a foot that falls less far, 14 ms, just stands."""
+
 
 class Scene(
     msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True, tag_field="kind"
@@ -58,6 +61,11 @@ class Ground(Scene, frozen=True):
     drop: float = 0.0
     friction: float = 1.0
     stop: float | None = None
+
+    @property
+    def lands(self) -> bool:
+        """Whether the run begins with a landing."""
+        return self.drop >= LANDING
 
     def __post_init__(self) -> None:
         check_number("mass", self.mass, "kg", low=0.0, high=HEAVIEST, strict=True)
