@@ -135,11 +135,26 @@ def test_phase_and_stance_are_those_of_when_the_steps_began(rng: np.random.Gener
         began = H * np.arange(float(window.start), window.stop)
         turned = np.concatenate([START[None], theta])[window.start : window.stop + 1]
         stance = path.in_stance(began) if isinstance(path, Gait) else None
-        phase = None if path.period is None else path.cycle(began)
+        phase = None if path.period is None else np.round(path.cycle(began), 9) % 1.0
         wanted = load.measure(torque[window], turned, H, stance=stance, phase=phase)
         found = measured(scenario, record)["load"]
         assert {**wanted, "saturated": {"A": 0.0, "E": 0.0}} == found
         assert ("stance" in found, "phase" in found) == (scenario is STEPS, scenario is not ONCE)
+
+
+def test_a_step_that_begins_at_the_edge_of_two_bins_is_of_the_later_one(
+    rng: np.random.Generator,
+) -> None:
+    """Whole milliseconds in whole numbers: rounding of the phase must not decide."""
+    settings = ["limits={}", "duration=1.0", "path.ramp=0.2", "path.frequency=5"]
+    scenario = Scenario.load("classic-ellipse", settings)
+    record = a_record(rng)
+    rows = np.arange(scenario.window.start, scenario.window.stop)
+    bins = 5 * (rows - 100) % 1000 * 8 // 1000  # half a ramp late
+    torque = record["torque_A"][rows]
+    wanted = [np.sqrt(np.mean(torque[bins == k] ** 2)) for k in range(8)]
+    found = measured(scenario, record)["load"]["phase"]["torque_rms"]["A"]
+    np.testing.assert_allclose(found, wanted, rtol=1e-12)
 
 
 def test_ground_says_when_the_foot_stood(rng: np.random.Generator) -> None:

@@ -20,6 +20,9 @@ from fivebar_sim.paths import Gait
 if TYPE_CHECKING:
     from fivebar_sim.scenario import Scenario
 
+DECIMALS = 9
+"""Decimals of a phase: far more than a step's part of a period, far fewer than rounding reaches."""
+
 
 class Unrecorded(NamedTuple):
     """Per-step data that the metrics need and rollout.parquet leaves out.
@@ -106,13 +109,14 @@ def _load(scenario: Scenario, record: Mapping[str, Array], start: Array, saturat
     phase = stance = None
 
     if path.period is not None:
-        phase = path.cycle(begun)
+        # A step that begins at the edge of two bins must not miss it by rounding.
+        phase = np.mod(np.round(path.cycle(begun), DECIMALS), 1.0)
 
     # With a ground the real stance counts, not the planned one.
     if "ground_z" in record:
         stance = ground.stands(record)[window]
-    elif isinstance(path, Gait):
-        stance = path.in_stance(begun)
+    elif isinstance(path, Gait) and phase is not None:
+        stance = phase < path.duty
 
     shared = load.sharing(torque[window], turned, h, stance=stance, phase=phase)
     clipped = saturated[window].mean(axis=0).tolist()
