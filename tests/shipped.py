@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
+import json
+import shutil
 from functools import cache
+from pathlib import Path
+
+import tomli_w
 
 from fivebar_sim import rollout
 from fivebar_sim.files import resources
 from fivebar_sim.rollout import Plan, Result
+from fivebar_sim.runs import directory
 from fivebar_sim.scenario import Scenario
 
 NAMES = sorted(resources.shipped("scenarios"))
@@ -28,3 +34,15 @@ def planned(name: str) -> Plan:
 def results() -> dict[str, Result]:
     """Return what comes of all scenarios, simulated together on two threads."""
     return dict(zip(NAMES, rollout.run_all([planned(n) for n in NAMES], nthread=2), strict=True))
+
+
+def written(name: str, folder: Path) -> Path:
+    """Return a folder with what a run directory holds besides the recording, which takes longer."""
+    result = results()[name]
+    text = tomli_w.dumps(result.scenario.table())
+    (folder / "scenario.toml").write_text(text, encoding="utf-8")
+    for copy, source in result.scenario.files.items():
+        shutil.copyfile(source, folder / copy)
+    (folder / "metrics.json").write_text(json.dumps(result.metrics), encoding="utf-8")
+    directory.write_record(folder / "rollout.parquet", result.record)
+    return folder
