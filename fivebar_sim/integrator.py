@@ -18,11 +18,15 @@ CONNECT = {
 """solref and solimp of the loop's closure by integrator; docs/model.md shows what they do."""
 
 
+ON_GROUND = 1e-4
+"""Default timestep of `implicitfast` on a ground [s]: longer ones let a light leg's foot creep."""
+
+
 class Sim(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """The table [sim] of a scenario.
 
     Attributes:
-        timestep: h [s].
+        timestep: h [s]. A scenario on a ground under "implicitfast" that gives none has 0.1 ms.
         integrator: MuJoCo's integrator, "discrete" or "implicitfast".
         seed: Seed of all random numbers in a run, such as the sensors' noise.
     """

@@ -17,11 +17,12 @@ from fivebar_sim.errors import ArgumentError, ConfigError, unknown
 from fivebar_sim.files import tables
 from fivebar_sim.files.tables import Table
 from fivebar_sim.geometry import FiveBar
+from fivebar_sim.integrator import ON_GROUND, Sim
 from fivebar_sim.metrics.catalogue import LIMIT_KEYS
 from fivebar_sim.paths import FootPath
 from fivebar_sim.scenario import forces, scenes
 from fivebar_sim.scenario.forces import FootForce
-from fivebar_sim.scenario.scenes import Scene
+from fivebar_sim.scenario.scenes import Ground, Scene
 
 # It names a folder: Windows forbids these characters and cuts a blank off the end, and a leading
 # dot would hide it.
@@ -107,6 +108,14 @@ def servo(value: Any, where: str, folder: Path) -> Servo:
 
     base, own = _preset("servo", read_servo, check, value, where, folder)
     return tables.convert({**base, **own}, Servo, "servo", where)
+
+
+def sim(value: Any, scene: Scene, where: str) -> Sim:
+    """Return the table [sim]; on a ground the default timestep is one that the integrator holds."""
+    if isinstance(value, dict) and isinstance(scene, Ground):
+        fine = value.get("integrator") == "implicitfast"
+        value = {"timestep": ON_GROUND, **value} if fine else value
+    return tables.convert(value, Sim, "sim", where)
 
 
 def converge(value: Any, where: str) -> dict[str, float]:
