@@ -20,7 +20,7 @@ from fivebar_sim.checks import check_number
 from fivebar_sim.errors import unknown
 from fivebar_sim.geometry import FiveBar
 from fivebar_sim.kinematics.stops import Ranges, beyond
-from fivebar_sim.metrics import ground
+from fivebar_sim.metrics import contact, ground
 from fivebar_sim.metrics.branch import Branch
 from fivebar_sim.metrics.columns import JOINT_COLUMNS
 from fivebar_sim.metrics.energy import Balance
@@ -49,6 +49,8 @@ class Guards(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
         floor: Largest depth of a joint or the trunk in the floor, as a part of the leg's size.
         stops: Largest angle by which a joint may lean into a stop [rad]; above 0 the stop pushes.
         rail: Largest force of the rail's end on the trunk [N].
+        contact: Largest h kd / M of a leg that stands with friction under `implicitfast`; errors of
+            torques and load share are up to 0.2 times as large. See `contact.shortfall`.
     """
 
     loop: float = 0.01
@@ -61,13 +63,14 @@ class Guards(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     floor: float = 0.01
     stops: float = 1e-5
     rail: float = 0.0
+    contact: float = 0.5
 
     def __post_init__(self) -> None:
         check_number("loop", self.loop, "", low=0.0)
         check_number("ground", self.ground, "", low=0.0)
         check_number("torque", self.torque, "", low=0.0, high=1.0)
         check_number("chatter", self.chatter, "", low=0.0, high=1.0)
-        for part in ("energy", "constraints", "step", "floor", "stops"):
+        for part in ("energy", "constraints", "step", "floor", "stops", "contact"):
             check_number(part, getattr(self, part), "", low=0.0)
         check_number("rail", self.rail, "N", low=0.0)
 
@@ -124,6 +127,8 @@ class Evidence(NamedTuple):
         command: Steps from one command of the motors to the next.
         ranges: The ranges of the joints, see `stops.beyond`.
         trunk: Height of the trunk's lowest point above the hip frame's origin [m].
+        creeping: Damping of the servos that makes a foot creep [N m s/rad]; None under `discrete`,
+            and on a floor without friction.
     """
 
     bounds: Guards
@@ -136,6 +141,7 @@ class Evidence(NamedTuple):
     command: int
     ranges: Ranges
     trunk: float
+    creeping: float | None = None
 
 
 class Found(NamedTuple):
@@ -251,6 +257,14 @@ def _carrying_rail(run: Evidence) -> Found | None:
     return _highest(run, run.record["rail_end"], run.bounds.rail)
 
 
+def _creeping(run: Evidence) -> Found | None:
+    if "ground_z" not in run.record or run.creeping is None:
+        return None
+    found = contact.shortfall(run.leg, run.record, run.creeping)
+    high = run.bounds.contact
+    return Found(None, high, None) if found is None else _highest(run, found, high)
+
+
 def _highest(run: Evidence, values: Array, high: float) -> Found:
     return Found(float(values.max()), high, _first(values > high, run.record["time"]))
 
@@ -344,6 +358,14 @@ GUARDS = (
         ", by {:.3g} deg at worst",
         DEGREES,
         "deg",
+    ),
+    Row(
+        "contact",
+        _creeping,
+        "the timestep is too long for a foot to stick under implicitfast, h kd / M above {:.3g}",
+        ", {:.3g} at worst: shorten it or use discrete",
+        1.0,
+        "",
     ),
     Row(
         "ground",

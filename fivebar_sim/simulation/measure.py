@@ -9,6 +9,7 @@ import msgspec
 import numpy as np
 
 from fivebar_sim.arrays import Array, Bools
+from fivebar_sim.control import Feedback
 from fivebar_sim.kinematics.stops import Ranges
 from fivebar_sim.metrics import branch, catalogue, energy, ground, guards, load, measured, peaks
 from fivebar_sim.metrics.columns import MOTORS, motors
@@ -16,6 +17,7 @@ from fivebar_sim.metrics.json_types import Parts
 from fivebar_sim.metrics.measured import Measured
 from fivebar_sim.metrics.sharing import Load
 from fivebar_sim.paths import Gait
+from fivebar_sim.scenario.scenes import Ground
 
 if TYPE_CHECKING:
     from fivebar_sim.scenario import Scenario
@@ -76,6 +78,7 @@ def measure(scenario: Scenario, record: Mapping[str, Array], besides: Unrecorded
         command=scenario.command,
         ranges=besides.ranges,
         trunk=besides.trunk,
+        creeping=_creeping(scenario),
     )
 
     window = scenario.window
@@ -93,6 +96,18 @@ def measure(scenario: Scenario, record: Mapping[str, Array], besides: Unrecorded
         warnings=int(besides.warnings),
         ground=ground.measure(leg, record, window) if grounded else msgspec.UNSET,
     )
+
+
+def _creeping(scenario: Scenario) -> float | None:
+    """Return the damping that makes a foot creep [N m s/rad]; None where it does not."""
+    scene = scenario.scene
+    sticks = isinstance(scene, Ground) and scene.friction > 0.0
+    if scenario.sim.integrator == "discrete" or not sticks:
+        return None
+    controller = scenario.controller
+    # Under a torque drive kd is the controller's: the step does not know it as damping.
+    drive = controller.drive if isinstance(controller, Feedback) else "position"
+    return scenario.servo.damping if drive == "position" else scenario.servo.back_emf
 
 
 def _load(scenario: Scenario, record: Mapping[str, Array], start: Array, saturated: Bools) -> Load:
