@@ -117,6 +117,11 @@ def _check_metrics(scenario: Scenario, record: Record, metrics: dict[str, Any]) 
         **{f"load.torque_rms.{motor}": _rms(tau) for motor, tau in torque.items()},
         **{f"load.torque_peak.{motor}": np.abs(tau).max() for motor, tau in torque.items()},
     }
+    for motor in "AE":
+        power = record[f"torque_{motor}"] * record[f"theta_dot_{motor}"]
+        plain[f"whole.torque_peak.{motor}"] = np.abs(record[f"torque_{motor}"]).max()
+        plain[f"whole.power_peak.{motor}"] = np.abs(power).max()
+        plain[f"power_peak.{motor}"] = np.abs(power[rows]).max()
     A, E = (float(np.abs(tau).sum()) for tau in torque.values())
     if look_up(metrics, "load.share_A") is not None:
         plain["load.share_A"] = A / (A + E)
