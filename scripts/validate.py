@@ -21,11 +21,14 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "tests"))
 import validation_air as air
 import validation_chain as chain
 import validation_flip as flip
+import validation_friction as friction
 import validation_stance as stance
 from validation_air import Key
 
 from fivebar_sim.control.servo import Servo
-from fivebar_sim.integrator import Integrator
+from fivebar_sim.integrator import ON_GROUND, Integrator
+from fivebar_sim.regression.convergence import plans, study
+from fivebar_sim.scenario import Scenario
 
 ROOT = Path(__file__).resolve().parent.parent
 OUT = ROOT / "docs" / "validation.svg"
@@ -175,6 +178,52 @@ def squats(timesteps: tuple[float, ...]) -> None:
     )
 
 
+def with_friction() -> None:
+    """Print the part of bar d that a contact with friction decides, and real servos."""
+    runs = {
+        "discrete, 1 ms": friction.mujoco("discrete", 1e-3, stance.DURATION),
+        "discrete, 1 ms, impratio 1000": friction.mujoco(
+            "discrete", 1e-3, stance.DURATION, impratio=1e3
+        ),
+        "discrete, 1 ms, noslip_iterations 3": friction.mujoco(
+            "discrete", 1e-3, stance.DURATION, noslip=3
+        ),
+        "implicitfast, 1 ms": friction.mujoco("implicitfast", 1e-3, stance.DURATION),
+        "implicitfast, 0.1 ms": friction.mujoco("implicitfast", ON_GROUND, stance.DURATION),
+        "implicitfast, 0.1 ms, noslip_iterations 3": friction.mujoco(
+            "implicitfast", ON_GROUND, stance.DURATION, noslip=3
+        ),
+        "discrete, 0.0625 ms, hard, impratio 1e4": friction.mujoco(
+            "discrete", 6.25e-5, stance.DURATION, impratio=1e4, hard=True
+        ),
+        "springs of 2e4 N/m": friction.coulomb(stance.DURATION, 2e4, 20.0),
+        "springs of 1e6 N/m": friction.coulomb(stance.DURATION, 1e6, 100.0),
+    }
+    known = friction.coulomb(stance.DURATION, 4e6, 300.0)
+    rows = []
+    for name, found in {**runs, "springs of 4e6 N/m": known}.items():
+        off = [f"{100 * (x / y - 1):+.1f}" for x, y in zip(found, known, strict=True)]
+        load = [f"{100 * found.share:.1f}", f"{1e3 * found.A:.1f}", f"{1e3 * found.E:.1f}"]
+        rows.append([name, *load, *off])
+
+    show(
+        "d. squat with friction 1: A's share [%], RMS torques [mN m], and what they are off [%]",
+        "contact | share | A | E | share off | A off | E off",
+        rows,
+    )
+    keys = ("load.torque_rms.A", "load.torque_rms.E", "load.share_A", "tracking.rms")
+    rows = []
+    for name in ("q8bot-xl330", "hobby-servo-circle"):
+        found = study(plans(Scenario.load(name), 4, "discrete")).metrics
+        rows.append([name, *(percent(found[key].error or 0.0) for key in keys)])
+
+    show(
+        "d. bus, gear friction and torque-speed line: off what timesteps down to 1/16 ms go to [%]",
+        "scenario, 1 ms | A RMS | E RMS | share | tracking RMS",
+        rows,
+    )
+
+
 def at_rest() -> None:
     """Print bars e and f."""
     rows = []
@@ -278,6 +327,7 @@ def main() -> None:
     swings = energy(steps)
     errors = convergence(steps)
     squats(steps)
+    with_friction()
     at_rest()
     flips(6 if quick else 14)
 
