@@ -13,7 +13,7 @@ from fivebar_sim import kinematics, metrics
 from fivebar_sim.arrays import Array, Bools
 from fivebar_sim.errors import ArgumentError
 from fivebar_sim.geometry import FiveBar
-from fivebar_sim.metrics import branch, energy, ground, guards, load
+from fivebar_sim.metrics import branch, catalogue, energy, ground, guards, load
 from fivebar_sim.paths import Gait
 from fivebar_sim.scenario import Scenario
 from fivebar_sim.simulation import measure
@@ -103,6 +103,19 @@ def test_tracking_is_of_the_window_and_closure_of_the_whole_run(rng: np.random.G
             (record["time"] > 0.25) & (record["time"] < 0.7505), record[name], 9
         )
     assert measured(ELLIPSE, record)["tracking"] == found["tracking"]
+
+
+def test_a_row_may_ask_the_leg_that_ran(
+    rng: np.random.Generator, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    rows = [
+        row._replace(function=lambda leg, record, window: leg.size)
+        for row in catalogue.MEASURED
+        if row.key == "closure.max"
+    ]
+    monkeypatch.setattr(catalogue, "MEASURED", (*catalogue.MEASURED, *rows))
+
+    assert measured(ELLIPSE, a_record(rng))["closure"]["max"] == ELLIPSE.leg.size
 
 
 def test_load_is_that_of_the_windows_torques_over_the_turns_of_their_steps(
