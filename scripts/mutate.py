@@ -68,7 +68,7 @@ ROOMS = {
         ("fivebar_sim/dynamics/[a-z]*.py",),
         (
             *("dynamics", "dynamics_friction", "dynamics_motion", "dynamics_stepwise"),
-            *("dynamics_laws", "singular_laws"),
+            *("dynamics_laws", "leg_dynamics", "singular_laws"),
         ),
     ),
     "metrics": Room(
