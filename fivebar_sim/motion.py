@@ -7,8 +7,8 @@ from typing import NamedTuple
 import numpy as np
 
 from fivebar_sim import kinematics, workspace
-from fivebar_sim.arrays import Array, Bools
-from fivebar_sim.errors import ArgumentError, UnreachableError
+from fivebar_sim.arrays import Array, Bools, at
+from fivebar_sim.errors import ArgumentError, SingularError, UnreachableError
 from fivebar_sim.geometry import FiveBar
 from fivebar_sim.kinematics.stops import (
     C_STOP,
@@ -83,7 +83,8 @@ def plan(
         UnreachableError: The path leaves the workspace, needs the other assembly mode, or drives
             a joint past its stop; or a projected target jumps. The message says when and where,
             and for a path out of the workspace how far out. `.index` is the step.
-        SingularError: A side chain is straight or folded somewhere on the path.
+        SingularError: A side chain is straight or folded somewhere on the path; says when and
+            where, too.
         ArgumentError: Some target needs a projection and the leg has L6 > 0, for which no margin
             is defined.
     """
@@ -92,7 +93,7 @@ def plan(
     # Compared by identity below: only projected targets lose their analytic rates.
     foot = _project(leg, wanted, time) if path.outside == "nearest" else wanted
     _check_reach(leg, foot.position, time)
-    q, q_dot, q_ddot = kinematics.joint_motion(leg, *foot)
+    q, q_dot, q_ddot = _joint_motion(leg, foot, time)
     rest = kinematics.home(leg)
     # Angles come in (-pi, pi]; a motor that goes round must not jump by a turn.
     q = _continuous(leg, rest, q)
@@ -126,7 +127,7 @@ def poses(leg: FiveBar, foot: Array) -> Array:
     still = np.zeros_like(foot)
     at_rest = np.zeros(len(foot))  # every pose is one at t = 0
     _check_reach(leg, foot, at_rest)
-    angles = kinematics.joint_motion(leg, foot, still, still).q
+    angles = _joint_motion(leg, Sample(foot, still, still), at_rest).q
     q = in_turn(leg, rest, angles, angles)
     q = in_range(q, q, q)
     _check_stops(leg, rest, foot, at_rest, q)
@@ -199,6 +200,33 @@ def _project(leg: FiveBar, wanted: Sample, time: Array) -> Sample:
 
 def _lengths(vectors: Array) -> Array:
     return np.hypot(vectors[:, 0], vectors[:, 1])
+
+
+def _joint_motion(leg: FiveBar, foot: Sample, time: Array) -> kinematics.JointMotion:
+    """Return the joints' motion along a path; see `kinematics.joint_motion`."""
+    try:
+        return kinematics.joint_motion(leg, *foot)
+    except SingularError as error:
+        raise singular(error, foot.position, time) from None
+
+
+def singular(error: SingularError, foot: Array, time: Array) -> SingularError:
+    """Return the error of a singular pose with when it is, and where the foot is.
+
+    Args:
+        error: The error of a batch of steps.
+        foot: F at these steps [m], (N, 2).
+        time: Their times [s], (N,).
+    """
+    # A user's controller may raise it with an index of whatever shape, or with none.
+    if len(error.index) != 1 or not 0 <= error.index[0] < len(time):
+        return error
+    (k,) = error.index
+    why = str(error).removesuffix(at(error.index)).rpartition("singular: ")[2]
+    return SingularError(
+        f"path comes to a singular pose at t = {time[k]:g} s, foot at {_mm(foot[k])}: {why}",
+        error.index,
+    )
 
 
 def _continuous(leg: FiveBar, rest: Array, q: Array) -> Array:

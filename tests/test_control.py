@@ -16,7 +16,7 @@ from fivebar_controllers.servo import Servo
 
 from fivebar_sim import control, motion, rollout
 from fivebar_sim.arrays import Array
-from fivebar_sim.errors import ConfigError
+from fivebar_sim.errors import ConfigError, SingularError
 from fivebar_sim.integrator import Integrator
 from fivebar_sim.scenario import Scenario
 
@@ -40,6 +40,12 @@ class Wrong(msgspec.Struct, frozen=True, kw_only=True):
         if self.kind == "refuse":
             from fivebar_sim.errors import ConfigError
             raise ConfigError("controller.gain must be in [0, 1], got 2")
+        if self.kind == "singular":
+            from fivebar_sim.errors import SingularError
+            raise SingularError("B, C and D are in line at index (3,)", (3,))
+        if self.kind == "somewhere":
+            from fivebar_sim.errors import SingularError
+            raise SingularError("B, C and D are in line")
         if self.kind == "shape":
             return u[:-1]
         u[3, 1] = float(self.kind)
@@ -199,6 +205,26 @@ def test_torque_that_would_need_a_setpoint_turns_away_is_refused(integrator: str
     plan = rollout.plan(Scenario.load("classic-ellipse", stiff))
     assert plan.setpoints is not None
     assert 1.5 < np.abs(plan.setpoints - plan.motion.q[1:, ::2]).max() < np.pi
+
+
+@pytest.mark.parametrize(
+    ("kind", "said"),
+    [
+        (
+            "singular",
+            "path comes to a singular pose at t = 0.003 s, foot at (0.00, -80.00) mm: B, C and D "
+            "are in line",
+        ),
+        ("somewhere", "B, C and D are in line"),
+    ],
+)
+def test_singular_pose_that_a_controller_meets_says_when_and_where(
+    plug: Plug, kind: str, said: str
+) -> None:
+    plug("strangers", {"wrong": "strangers:Wrong"})
+    with pytest.raises(SingularError) as caught:
+        rollout.plan(load(f"controller={{name='wrong', kind='{kind}'}}"))
+    assert str(caught.value) == said
 
 
 @pytest.mark.parametrize(

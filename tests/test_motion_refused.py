@@ -180,3 +180,24 @@ def test_a_leg_whose_motors_need_another_turn_is_not_refused() -> None:
     q = motion.plan(leg, line, 1000, 1e-3).q
     assert np.degrees(q[0, [0, 2]]) % 360.0 == pytest.approx([136.36, 12.95], abs=0.01)
     assert np.abs(q[:, [0, 2]]).max() < TURN
+
+
+STRETCHED = replace(FiveBar.load("classic"), L5=0.12)
+"""A leg whose both sides are stretched with the foot 80 mm below its hip."""
+
+
+@pytest.mark.parametrize("start", [-0.08, -0.07])
+def test_singular_pose_says_when_and_where(start: float) -> None:
+    """As its sisters do, the errors of a path out of reach, or beyond a stop."""
+    line = Line(start=(0.0, start), stop=(0.0, -0.15 - start), frequency=1.0, ramp=0.0)
+    with pytest.raises(SingularError) as caught:
+        motion.plan(STRETCHED, line, 1000, 1e-3)
+    k = 0 if start == -0.08 else 500
+    assert caught.value.index == (k,)
+    assert str(caught.value).startswith(
+        f"path comes to a singular pose at t = {1e-3 * k:g} s, foot at (0.00, -80.00) mm: A, B and "
+        "F are in line; the sine of the angle there must be above 2.4e-07, got "
+    )
+    assert "index" not in str(caught.value)
+    with pytest.raises(SingularError, match=r"at t = 0 s, foot at \(0\.00, -80\.00\) mm: A, B"):
+        motion.poses(STRETCHED, np.array([[0.0, -0.07], [0.0, -0.08]]))

@@ -15,7 +15,7 @@ from fivebar_sim.control.bus import Bus
 from fivebar_sim.control.interface import answer_of, is_numbers
 from fivebar_sim.control.servo import FARTHEST
 from fivebar_sim.control.step import check_whole_steps, whole_steps
-from fivebar_sim.errors import ConfigError
+from fivebar_sim.errors import ConfigError, SingularError
 from fivebar_sim.metrics.columns import MOTOR_JOINTS, MOTORS
 from fivebar_sim.motion import Motion
 from fivebar_sim.scenario import Scenario
@@ -57,21 +57,30 @@ def plan(scenario: Scenario) -> Plan:
 
     Raises:
         UnreachableError: The path leaves the leg's workspace; says when and where.
+        SingularError: Joints come in line on the path; says when and where.
         ConfigError: A controller that plans setpoints of the wrong shape, not finite, or more than
             half a turn from the motors' angles, a control period that is not a whole number of
             timesteps, or servos that cannot hold the leg.
         GeometryError: A leg that cannot stand on the scene's ground.
     """
-    sim = scenario.sim
-    scene = scenario.scene
     wanted = motion.plan(
         scenario.leg,
         scenario.path,
         scenario.steps,
-        sim.timestep,
+        scenario.sim.timestep,
         force=scenario.foot_force,
         payload=scenario.payload,
     )
+    try:
+        return _complete(scenario, wanted)
+    except SingularError as error:
+        raise motion.singular(error, wanted.foot, wanted.time) from None
+
+
+def _complete(scenario: Scenario, wanted: Motion) -> Plan:
+    """Return the plan of a scenario whose motion is planned; errors are those of `plan`."""
+    sim = scenario.sim
+    scene = scenario.scene
     # Before the model is built, which it does not need.
     holding.check(scenario, wanted)
     start = wanted.q[0]
