@@ -12,7 +12,7 @@ from fivebar_sim.metrics.columns import motors
 WITHIN = 1.0
 """Clipped and chattering steps are counted over this time [s], or over a shorter run."""
 
-FAINT = 0.2
+FAINT = 0.3
 """Changes of torque up to this part of the last second's RMS are too faint to be chatter."""
 
 
