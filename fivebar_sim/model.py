@@ -14,7 +14,7 @@ from typing import get_args
 import mujoco
 import numpy as np
 
-from fivebar_sim import kinematics
+from fivebar_sim import kinematics, units
 from fivebar_sim.arrays import Array
 from fivebar_sim.control.servo import Drive, Servo
 from fivebar_sim.errors import ArgumentError, GeometryError, unknown
@@ -190,7 +190,7 @@ def standing(leg: FiveBar, q: Array) -> float:
     if not height > 0.0:
         raise GeometryError(
             f"leg {leg.name!r} cannot stand: its foot must be below the hip (z points up), "
-            f"got {1e3 * (leg.foot_radius - height):.4g} mm above"
+            f"got {units.text(1e3 * (leg.foot_radius - height), 'mm')} above"
         )
     return height
 

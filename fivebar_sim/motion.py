@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fivebar_sim import kinematics, workspace
+from fivebar_sim import kinematics, units, workspace
 from fivebar_sim.arrays import Array, Bools, at
 from fivebar_sim.errors import ArgumentError, SingularError, UnreachableError
 from fivebar_sim.geometry import FiveBar
@@ -256,7 +256,9 @@ def _check_stops(leg: FiveBar, rest: Array, foot: Array, time: Array, q: Array) 
 def _refuse(bad: Bools, foot: Array, time: Array, what: str) -> None:
     if bad.any():
         k = int(np.argmax(bad))
-        raise UnreachableError(f"path {what}: at t = {time[k]:g} s, foot at {_mm(foot[k])}", (k,))
+        raise UnreachableError(
+            f"path {what}: at t = {time[k]:g} s, foot at {_place(foot[k])}", (k,)
+        )
 
 
 def _check_reach(leg: FiveBar, foot: Array, time: Array) -> None:
@@ -276,17 +278,23 @@ def _out_of_reach(
 ) -> UnreachableError:
     """Return the error of a path that leaves the workspace, with the nearest reachable point."""
     (k,) = index
-    lost = f"path out of reach at t = {time[k]:g} s: the foot at {_mm(foot[k])}"
+    lost = f"path out of reach at t = {time[k]:g} s: the foot at {_place(foot[k])}"
     nearest = workspace.nearest(leg, foot[k], mode=leg.mode)
     out = float(np.hypot(*(foot[k] - nearest)))
     # A hundred legs away nobody means metres: 0.08 m read as 80.
     far = np.hypot(*foot[k]) > 100.0 * leg.size
     hint = "; positions are in metres: were these in mm?" if far else ""
     return UnreachableError(
-        f"{lost} is {1e3 * out:.3g} mm out; the nearest reachable point is {_mm(nearest)}{hint}",
+        f"{lost} is {units.text(1e3 * out, 'mm', 3)} out; the nearest reachable point is "
+        f"{_place(nearest)}{hint}",
         index,
     )
 
 
-def _mm(point: Array) -> str:
-    return f"({1e3 * point[0]:.2f}, {1e3 * point[1]:.2f}) mm"
+def _place(point: Array) -> str:
+    """Return (x, z) in the unit that fits the larger of both."""
+    largest = float(np.abs(point).max())
+    # A point at the hip has no size of its own.
+    number, unit = units.fitting(max(1e3 * largest, 1.0), "mm")
+    x, z = (point * number / max(largest, 1e-3)).tolist()
+    return f"({x:.2f}, {z:.2f}) {unit}"

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from fivebar_sim import units
 from fivebar_sim.errors import ArgumentError, DivergedError
 from fivebar_sim.metrics import tracking
 from fivebar_sim.metrics.columns import Record
@@ -180,7 +181,7 @@ def _result(planned: Plan, states: States) -> Result:
     # A foot that is gone leaves finite numbers behind, and metrics of nothing.
     lost = tracking.lost_path(scenario.leg, record)
     if lost is not None:
-        far = f"it was {1e3 * scenario.leg.size:.4g} mm away from it at t = {lost:g} s"
+        far = f"it was {units.text(1e3 * scenario.leg.size, 'mm')} away from it at t = {lost:g} s"
         raise broken(planned, states, DivergedError(far, lost))
 
     try:

@@ -14,7 +14,7 @@ PACKAGES = {"fivebar_sim": "fivebar_sim", "fivebar_controllers": "controllers/fi
 
 LEVELS = (
     "errors",
-    "arrays checks files",
+    "arrays checks files units",
     "links",
     "geometry integrator paths",
     "kinematics",

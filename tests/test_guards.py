@@ -316,7 +316,7 @@ def test_new_guard_is_a_row_and_a_function(shell: Shell, monkeypatch: pytest.Mon
         depth = float(-run.record["foot_z"].min())
         return guards.Found(depth, 0.01, float(run.record["time"][3]))
 
-    row = guards.Row("depth", too_deep, "foot below {:.3g} mm", ", {:.3g} at worst", 1e3, "mm")
+    row = guards.Row("depth", too_deep, "foot below {}", ", {} at worst", 1e3, "mm")
     monkeypatch.setattr(guards, "GUARDS", (*guards.GUARDS, row))
     monkeypatch.setitem(guards.ROWS, row.name, row)
 

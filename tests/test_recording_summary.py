@@ -62,4 +62,4 @@ def test_it_is_in_the_recording(tmp_path: Path) -> None:
 
 def test_limit_on_what_was_not_measured_is_broken() -> None:
     text = summary(["air"], [MEASURED], [{"ground.slip": (0.0, 1.0)}])
-    assert "| slip in stance | 0 to 1000 mm | undefined | **FAIL** |" in text
+    assert "| slip in stance | 0 to 1 m | undefined | **FAIL** |" in text

@@ -60,7 +60,7 @@ def test_band_of_a_motor_is_its_torque_speed_line(ellipse: StoredRun) -> None:
 
 @pytest.mark.parametrize(
     ("limit", "said", "lines"),
-    [(None, "", 4), (0.005, "is 5 mN m at rest: dash", 6), (5.0, "5000 mN m at rest, outside", 4)],
+    [(None, "", 4), (0.005, "is 5 mN m at rest: dash", 6), (5.0, "5 N m at rest, outside", 4)],
 )
 def test_a_limit_is_drawn_where_it_is_near(
     ellipse: StoredRun, limit: float | None, said: str, lines: int

@@ -30,6 +30,7 @@ def workspace(
         path: A scenario whose foot path is drawn over it, and how near it comes to the edge is
             printed; a path that leaves the workspace gets a warning.
     """
+    from fivebar_sim import units
     from fivebar_sim.geometry import FiveBar
     from fivebar_sim.report import workspace_map
     from fivebar_sim.scenario import Scenario
@@ -39,11 +40,10 @@ def workspace(
     place = Path(f"workspace-{drawn.name}.png" if out is None else out)
     way = None if followed is None else followed.foot_path
     surveyed = workspace_map.write(drawn, place, way)
-    area = 1e4 * surveyed.area
-    deepest = 1e3 * float(surveyed.distance.max())
+    area = units.text(1e4 * surveyed.area, "cm2")
+    deepest = units.text(1e3 * float(surveyed.distance.max()), "mm", 3)
     print(  # noqa: T201
-        f"{drawn.name}: the foot reaches {area:.1f} cm2 and gets up to {deepest:.1f} mm inside; "
-        f"drawn in {place}"
+        f"{drawn.name}: the foot reaches {area} and gets up to {deepest} inside; drawn in {place}"
     )
     if followed is not None and way is not None:
         _say_margin(drawn, followed, way)

@@ -9,6 +9,7 @@ import math
 from collections.abc import Callable, Iterator, Mapping
 from typing import NamedTuple
 
+from fivebar_sim import units
 from fivebar_sim.arrays import Array
 from fivebar_sim.geometry import FiveBar
 from fivebar_sim.metrics import ground, tracking
@@ -204,7 +205,7 @@ CATALOGUE = (
     ),
     Metric(
         key="ground.rail_end_max",
-        label="force of the rail's end max",
+        label="rail's end force max",
         scale=1.0,
         unit="N",
         tolerance=1e-3,
@@ -267,21 +268,11 @@ LESS_IS_BETTER = tuple(metric.key for metric in CATALOGUE if metric.less_is_bett
 MEASURED = tuple(metric for metric in CATALOGUE if metric.function is not None)
 """The metrics with a function of their own."""
 
-SMALLER = {"mm": "um", "um": "nm", "W": "mW", "mW": "uW", "rad/s": "mrad/s"}
-"""The unit a thousand times smaller, for values that would begin with 0.00."""
-
 
 def shown(key: str, value: float | None) -> str:
-    """Return a metric's value in the unit that people read."""
+    """Return a metric's value in the unit that people read, and that fits its size."""
     _, scale, unit = SHOWN[key]
-    if value is None:
-        return "undefined"
-    number = scale * value
-    # 2e-5 mm tells people nothing; 20 nm does.
-    while 0.0 < abs(number) < 0.01 and unit in SMALLER:
-        number = 1e3 * number
-        unit = SMALLER[unit]
-    return f"{number:.4g} {unit}".strip()
+    return "undefined" if value is None else units.text(scale * value, unit)
 
 
 def measure(

@@ -15,6 +15,7 @@ from typing import Annotated, NamedTuple
 import msgspec
 import numpy as np
 
+from fivebar_sim import units
 from fivebar_sim.arrays import Array, Bools
 from fivebar_sim.checks import check_number
 from fivebar_sim.errors import unknown
@@ -104,12 +105,12 @@ class Guard(Table, frozen=True):
     def bound(self) -> str:
         """What must not happen, in words, of the part that tripped it or of any part of the leg."""
         row = ROWS[self.name]
-        return row.what.format(row.scale * self.high, part=self.part or "leg")
+        return row.what.format(row.show(self.high, 3), part=self.part or "leg")
 
     def __str__(self) -> str:
         """Return the message of a guard that tripped: the bound, when, and the worst value."""
         row = ROWS[self.name]
-        worst = row.worst.format(row.scale * (self.value or 0.0))
+        worst = row.worst.format(row.show(self.value, 3))
         return f"guard {self.name}: {self.bound} at t = {self.time:g} s{worst}"
 
 
@@ -159,8 +160,9 @@ class Row(NamedTuple):
     Attributes:
         name: Name of the guard, and of its bound in a scenario, if it has one.
         function: Finds the worst value; returns None for runs that the guard does not apply to.
-        what: First part of its message, with the bound and, as {part}, the part that tripped it.
-        worst: Last part of its message, with the worst value.
+        what: First part of its message, with {} for the bound and its unit and, as {part}, the part
+            that tripped it.
+        worst: Last part of its message, with {} for the worst value and its unit.
         scale: Factor from SI to the shown unit.
         unit: The shown unit.
     """
@@ -172,9 +174,9 @@ class Row(NamedTuple):
     scale: float
     unit: str
 
-    def show(self, value: float | None) -> str:
+    def show(self, value: float | None, digits: int = 4) -> str:
         """Return a bound or a value as people read it: "1.2 mm"."""
-        return f"{self.scale * (value or 0.0):.4g} {self.unit}"
+        return units.text(self.scale * (value or 0.0), self.unit, digits)
 
 
 def judge(run: Evidence) -> list[Guard]:
@@ -298,48 +300,48 @@ GUARDS = (
     Row(
         "loop",
         _open_loop,
-        "the loop was open by more than {:.3g} mm",
-        ", by {:.3g} mm at worst",
+        "the loop was open by more than {}",
+        ", by {} at worst",
         1e3,
         "mm",
     ),
     Row(
         "torque",
         _clipped_torque,
-        "a motor's torque had been clipped for more than {:.3g} % of a second",
-        ", for {:.3g} % at worst",
+        "a motor's torque had been clipped for more than {} of a second",
+        ", for {} at worst",
         1e2,
         "%",
     ),
     Row(
         "chatter",
         _chatter,
-        "a motor's torque had turned round with every command in more than {:.3g} % of a second",
-        ", in {:.3g} % at worst",
+        "a motor's torque had turned round with every command in more than {} of a second",
+        ", in {} at worst",
         1e2,
         "%",
     ),
     Row(
         "energy",
         _unaccounted_energy,
-        "more than {:.3g} % of the energy turned over was unaccounted for",
-        ", {:.3g} % at worst",
+        "more than {} of the energy turned over was unaccounted for",
+        ", {} at worst",
         1e2,
         "%",
     ),
     Row(
         "constraints",
         _giving_constraints,
-        "loop, gears or ends of travel had given more than {:.3g} % of the energy at stake",
-        ", {:.3g} % at worst",
+        "loop, gears or ends of travel had given more than {} of the energy at stake",
+        ", {} at worst",
         1e2,
         "%",
     ),
     Row(
         "step",
         _giving_steps,
-        "the steps by themselves had given or taken more than {:.3g} % of the energy turned over",
-        ", {:.3g} % at worst",
+        "the steps by themselves had given or taken more than {} of the energy turned over",
+        ", {} at worst",
         1e2,
         "%",
     ),
@@ -347,47 +349,47 @@ GUARDS = (
         "solver",
         _unsolved,
         "MuJoCo's solver did not converge",
-        ", nor in {:.0f} steps in all",
+        ", nor in {} in all",
         1.0,
         "steps",
     ),
     Row(
         "stops",
         _leaned,
-        "{part} leaned into its stop by more than {:.3g} deg",
-        ", by {:.3g} deg at worst",
+        "{part} leaned into its stop by more than {}",
+        ", by {} at worst",
         DEGREES,
         "deg",
     ),
     Row(
         "contact",
         _creeping,
-        "the timestep is too long for a foot to stick under implicitfast, h kd / M above {:.3g}",
-        ", {:.3g} at worst: shorten it or use discrete",
+        "the timestep is too long for a foot to stick under implicitfast, h kd / M above {}",
+        ", {} at worst: shorten it or use discrete",
         1.0,
         "",
     ),
     Row(
         "ground",
         _in_floor,
-        "the foot was in the floor by more than {:.3g} mm",
-        ", by {:.3g} mm at worst",
+        "the foot was in the floor by more than {}",
+        ", by {} at worst",
         1e3,
         "mm",
     ),
     Row(
         "floor",
         _through_floor,
-        "the {part} was in the floor by more than {:.3g} mm",
-        ", by {:.3g} mm at worst",
+        "the {part} was in the floor by more than {}",
+        ", by {} at worst",
         1e3,
         "mm",
     ),
     Row(
         "rail",
         _carrying_rail,
-        "the rail's end carried the trunk, with more than {:.3g} N",
-        ", {:.3g} N at worst",
+        "the rail's end carried the trunk, with more than {}",
+        ", {} at worst",
         1.0,
         "N",
     ),

@@ -74,6 +74,7 @@ def bounds(limit: Limit) -> str:
     if limit.low == -math.inf:
         return f"<= {shown(limit.key, limit.high)}"
     low, high = (shown(limit.key, bound) for bound in (limit.low, limit.high))
-    # The unit once, behind both numbers.
-    unit = high.partition(" ")[2]
-    return f"{low.removesuffix(unit).strip()} to {high}"
+    number, _, unit = low.partition(" ")
+    # The unit once, behind both numbers, unless their sizes ask for two; 0 has none.
+    same = unit == high.partition(" ")[2] or limit.low == 0.0
+    return f"{number if same else low} to {high}"

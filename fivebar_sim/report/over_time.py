@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from fivebar_sim import units
 from fivebar_sim.arrays import Array
 from fivebar_sim.metrics import ground, tracking
 from fivebar_sim.metrics.catalogue import shown
@@ -118,7 +119,9 @@ def torque(run: StoredRun) -> Drawn:
 def _torque(ax: Axes, run: StoredRun, motor: str, largest: float) -> bool:
     """Draw the torque of one motor; `largest` [N m] sets the scale. Return whether it is cut."""
     time = run.record["time"]
-    tau = 1e3 * run.record[f"torque_{motor}"]
+    fitted, unit = units.fitting(1e3 * largest, "mN m")
+    scale = fitted / largest if largest > 0.0 else 1e3
+    tau = scale * run.record[f"torque_{motor}"]
     window = run.scenario.window
     rms, peak = (look_up(run.metrics, f"load.torque_{kind}.{motor}") for kind in ("rms", "peak"))
     part = look_up(run.metrics, "load.share_A")
@@ -126,23 +129,23 @@ def _torque(ax: Axes, run: StoredRun, motor: str, largest: float) -> bool:
     draw.line(ax, time, tau, motor)
 
     for side in (-1.0, 1.0):
-        ax.axhline(side * 1e3 * (rms or 0.0), color=colour("ink"), ls="--", lw=1.0)
+        ax.axhline(side * scale * (rms or 0.0), color=colour("ink"), ls="--", lw=1.0)
 
     # The metrics count the window only, so the ring must not mark a peak of the ramp.
     top = window.start + int(np.abs(tau[window]).argmax())
     ax.plot(time[top], tau[top], "o", mfc="none", mec=colour("ink"), ms=8, mew=1.4)
-    room = 1.15e3 * largest or 1.0
+    room = 1.15 * scale * largest or 1.0
     limit = run.scenario.servo.limit
     band = numbers.torque_band(run, motor)
 
     if band is not None and limit is not None and limit <= numbers.IN_VIEW * largest:
         for edge in band:
-            draw.line(ax, time, 1e3 * edge, "muted", ls="-.", lw=1.0)
-            room = max(room, 1.05e3 * float(np.abs(edge[window]).max()))
+            draw.line(ax, time, scale * edge, "muted", ls="-.", lw=1.0)
+            room = max(room, 1.05 * scale * float(np.abs(edge[window]).max()))
 
     draw.shade_unmeasured(ax, run)
     levels = f"RMS {shown('load.torque_rms.A', rms)}, peak {shown('load.torque_peak.A', peak)}"
-    ax.set(ylabel=f"torque {motor} [mN m]", ylim=(-room, room))
+    ax.set(ylabel=f"torque {motor} [{unit}]", ylim=(-room, room))
     ax.set_title(f"{motor}: {levels}, share {shown('load.share_A', part)}", loc="left")
     return axes.mark_cut(ax, run, tau)
 

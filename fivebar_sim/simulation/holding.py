@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fivebar_sim import dynamics
+from fivebar_sim import dynamics, units
 from fivebar_sim.arrays import Array
 from fivebar_sim.errors import ConfigError
 from fivebar_sim.motion import Motion
@@ -34,7 +34,8 @@ def check(scenario: Scenario, wanted: Motion) -> None:
         name = "AE"[int(np.argmax(np.abs(torque[k])))]
         raise ConfigError(
             f"servo.limit cannot hold the leg at t = {wanted.time[k]:g} s: motor {name} must give "
-            f"at least {worst[k]:.4g} N m there at rest, got a limit of {limit:g} N m"
+            f"at least {units.text(worst[k], 'N m')} there at rest, got a limit of "
+            f"{units.text(limit, 'N m')}"
         )
 
 
