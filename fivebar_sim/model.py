@@ -108,6 +108,9 @@ def leg_spec(
     """Return leg.xml with the numbers of a leg, ready to compile or to attach by its body `hip`.
 
     Arguments and errors are those of `build`; with a scene it is the scene's file, leg included.
+    Without one the hip frame is the world's, so that attached at a site or frame it is that one:
+
+        trunk.add_frame(pos=(0.1, 0, 0)).attach_body(leg_spec(leg).body("hip"), "FL_", "")
     """
     if integrator not in get_args(Integrator):
         raise ArgumentError(unknown("integrator", str(integrator), get_args(Integrator)))
@@ -136,11 +139,24 @@ def leg_spec(
     _drive(spec, servo, drive)
     _close(spec, leg, integrator, q)
 
-    if isinstance(scene, Payload):
+    if scene is None:
+        _lower(spec)
+    elif isinstance(scene, Payload):
         _load(spec, leg, scene)
     elif isinstance(scene, Ground):
         _stand(spec, leg, scene, q)
     return spec
+
+
+def _lower(spec: mujoco.MjSpec) -> None:
+    """Move the whole world down until the hip frame is at its origin: floor, light and camera too.
+
+    An attached body keeps its own pose within what it is attached to.
+    """
+    down = np.array(spec.body("hip").pos)
+    spec.body("hip").pos = (0.0, 0.0, 0.0)
+    for thing in (*spec.worldbody.geoms, *spec.worldbody.lights, *spec.worldbody.cameras):
+        thing.pos = np.array(thing.pos) - down
 
 
 def _load(spec: mujoco.MjSpec, leg: FiveBar, scene: Payload) -> None:

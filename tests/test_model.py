@@ -169,6 +169,33 @@ def test_two_legs_attach_to_one_body(integrator: model.Integrator) -> None:
                     np.testing.assert_array_equal(getattr(one, field), getattr(two, field))
 
 
+def test_hip_frame_is_where_a_leg_is_attached(leg: FiveBar) -> None:
+    """Every link and the foot are where the kinematics puts them, seen from the site."""
+    parent = mujoco.MjSpec()
+    trunk = parent.worldbody.add_body(name="trunk", pos=(0.3, -0.2, 1.0))
+    site = trunk.add_site(name="shoulder", pos=(0.1, 0.04, -0.02))
+    with model.quiet():  # the parent has its own options
+        parent.attach(model.leg_spec(leg), site=site, prefix="FL_")
+        mj = parent.compile()
+    data = mujoco.MjData(mj)
+    data.qpos[:] = kinematics.home(leg)
+    mujoco.mj_kinematics(mj, data)
+
+    hip = data.body("FL_hip").xpos
+    np.testing.assert_allclose(hip, data.site("shoulder").xpos, atol=1e-12)
+    np.testing.assert_allclose(hip, [0.4, -0.16, 0.98], atol=1e-12)
+    points = kinematics.chain_points(leg, kinematics.home(leg))
+    np.testing.assert_allclose((data.site("FL_foot").xpos - hip)[[0, 2]], points.F, atol=1e-12)
+
+
+def test_leg_alone_hangs_over_its_floor_as_in_the_air(leg: FiveBar) -> None:
+    alone = model.leg_spec(leg).compile()
+    air = model.build(leg)
+    heights = [mj.body("hip").pos[2] - mj.geom("floor").pos[2] for mj in (alone, air)]
+    assert heights[0] == pytest.approx(heights[1], rel=1e-15)
+    np.testing.assert_array_equal(alone.body("hip").pos, 0.0)
+
+
 COUNT = {"body": "nbody", "joint": "njnt", "geom": "ngeom", "site": "nsite", "actuator": "nu",
          "equality": "neq", "sensor": "nsensor"}  # fmt: skip
 SAME = {

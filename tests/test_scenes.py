@@ -90,6 +90,15 @@ def assert_same(one: mujoco.MjModel, two: mujoco.MjModel, *but: str) -> None:
     assert one.nexclude == two.nexclude == 1
 
 
+def raised(spec: mujoco.MjSpec, leg: FiveBar) -> mujoco.MjSpec:
+    """Return the leg alone, whose hip frame is the world's, as high over its floor as in air."""
+    height = model.HIP_HEIGHT * leg.size
+    np.testing.assert_allclose(spec.geom("floor").pos, [0.0, 0.0, -height], rtol=1e-15)
+    spec.body("hip").pos = (0.0, 0.0, height)
+    spec.geom("floor").pos = (0.0, 0.0, 0.0)
+    return spec
+
+
 def scene_id(scene: Scene) -> str:
     return scene.kind
 
@@ -157,7 +166,7 @@ def test_options_are_the_legs(scene: Scene, integrator: Integrator) -> None:
 @pytest.mark.parametrize("scene", SCENES, ids=scene_id)
 @pytest.mark.parametrize("leg", HANGING, ids=leg_id)
 def test_leg_keeps_its_numbers(leg: FiveBar, scene: Scene) -> None:
-    alone = model.leg_spec(leg, servo=SERVO).compile()
+    alone = raised(model.leg_spec(leg, servo=SERVO), leg).compile()
     built = model.build(leg, servo=SERVO, scene=scene)
     assert_same(alone, built, *(["L2"] if isinstance(scene, Payload) else []))
     np.testing.assert_array_equal(built.qpos0[-4:], alone.qpos0)
@@ -171,7 +180,7 @@ def test_air_gives_the_bits_of_the_leg_alone(integrator: Integrator) -> None:
     runs = []
     t = np.arange(600)[:, None] * 1e-3
     for spec in (
-        model.leg_spec(ODD, servo=SERVO, integrator=integrator),
+        raised(model.leg_spec(ODD, servo=SERVO, integrator=integrator), ODD),
         model.leg_spec(ODD, servo=SERVO, scene=Air(), integrator=integrator),
     ):
         with model.quiet():
