@@ -255,6 +255,63 @@ def test_published_limits_pick_the_knees_outwards_of_an_upright_leg() -> None:
     assert ((theta >= low) & (theta <= high)).all()
 
 
+def published(leg: FiveBar, x: float, y: float, most: float) -> tuple[int, int]:
+    """Return the whole degrees of the published controller, from A, upright, term by term.
+
+    Its beta is at most 45 degrees; with more, both of a side's knees are within more often.
+    """
+    a = 2 * x * leg.L1
+    b = 2 * y * leg.L1
+    c = x * x + y * y + leg.L1**2 - leg.L2**2
+    d = 2 * leg.L4 * (x - leg.L5)
+    e = 2 * leg.L4 * y
+    f = (x - leg.L5) ** 2 + leg.L4**2 + y * y - leg.L3**2
+    alpha_1, alpha_2 = (
+        2 * math.atan((b + s * math.sqrt(a * a + b * b - c * c)) / (a + c)) for s in (1, -1)
+    )
+    beta_1, beta_2 = (
+        2 * math.atan((e + s * math.sqrt(d * d + e * e - f * f)) / (d + f)) for s in (1, -1)
+    )
+    alpha = alpha_1 if alpha_1 >= math.pi / 4 else alpha_2
+    beta = beta_1 if 0 <= beta_1 <= most else beta_2
+    return int(math.degrees(alpha)), int(math.degrees(beta))
+
+
+@pytest.mark.parametrize(("most", "least"), [(math.pi / 4, 0), (math.pi, 50)])
+def test_published_rule_is_that_of_its_controller(most: float, least: int) -> None:
+    """alpha_1 where both roots are within, whole degrees by truncation; "modes" takes alpha_2."""
+    leg = FiveBar()
+    rng = np.random.default_rng(17)
+    limits = (PUBLISHED_LIMITS[0], (0.0, most))
+    both = 0
+    for _ in range(300):
+        foot = rng.uniform((-0.06, 0.02), (0.06, 0.1))
+        try:
+            modes = kinematics.inverse_within(leg, foot, limits)
+        except UnreachableError:
+            continue
+        theta = kinematics.inverse_within(leg, foot, limits, rule="published")
+        own = published(leg, float(foot[0]) + 0.5 * leg.L5, float(foot[1]), most)
+        np.testing.assert_allclose(np.degrees(theta), own, rtol=0, atol=1e-9)
+        both += bool(np.abs(modes - theta).max() > math.radians(1.0))
+    assert both >= least  # points where the two rules take different knees
+
+
+def test_truncation_goes_towards_zero_and_keeps_whole_degrees() -> None:
+    limits = ((-7.0, 7.0), (-7.0, 7.0))
+    foot = sample(RIGID, (200,))[0]
+    theta = np.degrees(kinematics.inverse_within(RIGID, foot, limits, rule="published"))
+    np.testing.assert_allclose(theta, np.rint(theta), rtol=0, atol=1e-9)
+    # pi is 180 degrees, also where rounding leaves it a bit below; -106.3 becomes -106
+    foot_of = kinematics.forward(RIGHT, np.array([-2.0 * math.atan2(4.0, 3.0), math.pi]))
+    np.testing.assert_allclose(foot_of, (0.0, -0.04), atol=1e-15)
+    at_pi = ((-4.0, -1.0), (3.0, 4.0))
+    right = kinematics.inverse_within(RIGHT, (0.0, -0.04), at_pi, rule="published")
+    np.testing.assert_allclose(np.degrees(right), (-106.0, 180.0), rtol=0, atol=1e-9)
+    with pytest.raises(ArgumentError, match=r"^unknown rule 'first'; known: modes, published"):
+        kinematics.inverse_within(RIGID, foot, limits, rule="first")  # pyright: ignore[reportArgumentType]
+
+
 def test_limits_are_closed_and_kept_to_rounding_and_fewest_turns_are_taken() -> None:
     # angles (-2a or 0, pi or 2a - pi)
     foot = (0.0, -0.04)

@@ -44,11 +44,13 @@ the fold, where r = 0, about sqrt(u / L1 |AC|). The same holds for `kinematics.i
 
 from __future__ import annotations
 
+from typing import Literal, get_args
+
 import numpy as np
 from numpy.typing import ArrayLike
 
 from fivebar_sim.arrays import Array, Bools, as_pairs, at, first_index
-from fivebar_sim.errors import ArgumentError, UnreachableError
+from fivebar_sim.errors import ArgumentError, UnreachableError, unknown
 from fivebar_sim.geometry import MODES, FiveBar, Mode
 from fivebar_sim.kinematics.closure import bases
 from fivebar_sim.kinematics.planar import dot, turned, unit, wrap
@@ -66,6 +68,9 @@ PUBLISHED_LIMITS: tuple[Range, Range] = ((np.pi / 4.0, np.pi), (0.0, np.pi / 4.0
 """Joint limits [rad] by which the published controller picks its branch, for a leg that stands
 upright (foot at z > 0): theta_A at least 45 deg, theta_E in 0..45 deg. It gives no upper limit for
 theta_A; pi is the largest value of 2 atan."""
+
+Rule = Literal["modes", "published"]
+"""How `inverse_within` picks one of several modes within the limits."""
 
 SLACK = 1e-12
 """Slack of joint limits [rad]: the rounding of an angle that is meant to lie on one."""
@@ -151,26 +156,38 @@ def inverse_half_angle(leg: FiveBar, foot: ArrayLike, *, mode: Mode | None = Non
     return theta
 
 
-def inverse_within(leg: FiveBar, foot: ArrayLike, limits: ArrayLike) -> Array:
+def inverse_within(
+    leg: FiveBar, foot: ArrayLike, limits: ArrayLike, *, rule: Rule = "modes"
+) -> Array:
     """Return the motor angles in the working mode whose angles are within joint limits.
 
     An angle counts as within its limits if whole turns bring it there, up to `SLACK`; the fewest
-    turns are taken. If several modes fit, the first in the order of `MODES` is taken.
+    turns are taken. If several modes fit, the rule decides:
+
+        "modes"       the first in the order of `MODES`; the angles are exact
+        "published"   as the published controller: alpha_1, the root with + (s_A = +1), where it is
+                      within its limits, then beta_1 likewise, and each angle without its fraction
+                      of a degree (towards 0), so that the foot is off by up to a degree's worth
 
     Args:
         leg: The leg.
         foot: F [m], hip frame, (..., 2).
         limits: ((low_A, high_A), (low_E, high_E)) [rad], ends included; `PUBLISHED_LIMITS` are
             those of the published controller.
+        rule: "modes" or "published".
 
     Returns:
-        (theta_A, theta_E) [rad] within the limits, so perhaps beyond (-pi, pi], (..., 2).
+        (theta_A, theta_E) [rad] within the limits, so perhaps beyond (-pi, pi], (..., 2). Those
+        of "published" may lie below a limit that is no whole degree.
 
     Raises:
         UnreachableError: No mode reaches some point, or none of those that do is within the
             limits; the message names the limit, `.index` is the first such point.
-        ArgumentError: The limits are not two finite ranges, or foot has another shape.
+        ArgumentError: The limits are not two finite ranges, foot has another shape, or unknown
+            rule.
     """
+    if rule not in get_args(Rule):
+        raise ArgumentError(unknown("rule", str(rule), get_args(Rule)))
     foot = as_pairs(foot, "foot")
     low, high = _ends(limits)
     solved = [solve(leg, foot, mode) for mode in MODES]
@@ -194,7 +211,18 @@ def inverse_within(leg: FiveBar, foot: ArrayLike, limits: ArrayLike) -> Array:
 
     theta = theta + 2.0 * np.pi * np.clip(0.0, fewest, most)
     first = np.argmax(within, axis=-1)
-    return np.take_along_axis(theta, first[..., None, None], axis=-2)[..., 0, :]
+    if rule == "published":
+        # In MODES - comes before +: the last mode that fits has alpha_1, and beta_1, if it may.
+        first = len(MODES) - 1 - np.argmax(within[..., ::-1], axis=-1)
+    chosen = np.take_along_axis(theta, first[..., None, None], axis=-2)[..., 0, :]
+    return chosen if rule == "modes" else _truncated(chosen)
+
+
+def _truncated(theta: Array) -> Array:
+    """Return angles without their fractions of a degree, towards 0 [rad]."""
+    degrees = np.degrees(theta)
+    # An angle that is meant to be a whole degree stays one, whatever its rounding.
+    return np.radians(np.trunc(degrees + np.copysign(np.degrees(SLACK), degrees)))
 
 
 def _ends(limits: ArrayLike) -> tuple[Array, Array]:
