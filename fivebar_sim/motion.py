@@ -224,7 +224,7 @@ def singular(error: SingularError, foot: Array, time: Array) -> SingularError:
     (k,) = error.index
     why = str(error).removesuffix(at(error.index)).rpartition("singular: ")[2]
     return SingularError(
-        f"path comes to a singular pose at t = {time[k]:g} s, foot at {_mm(foot[k])}: {why}",
+        f"path comes to a singular pose at t = {time[k]:g} s, foot at {_place(foot[k])}: {why}",
         error.index,
     )
 

@@ -180,8 +180,11 @@ def test_comparison_tells_runs_apart(runs: dict[str, Path], pages: dict[str, Pag
     page = pages["all"]
     rows = pages["all"].rows()
     assert page.ids("figure") == OVERLAID
-    assert rows[0] == ["metric", *runs]
-    assert rows[1] == ["verdict", "FAIL", "FAIL", "pass"]
+    # what was changed comes before what came of it
+    assert page.all("h2")[0].text == ["What differs in the scenarios"]
+    assert rows[0] == ["key", *runs]
+    start = rows.index(["metric", *runs])
+    assert rows[start + 1] == ["verdict", "FAIL", "FAIL", "pass"]
     for svg in page.all("svg"):
         assert set(runs) <= {text.strip() for text in svg.text}
     read = [stored.read(path) for path in runs.values()]

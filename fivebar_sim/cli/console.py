@@ -16,6 +16,7 @@ from fivebar_sim.metrics.catalogue import SHOWN, shown
 from fivebar_sim.metrics.limits import bounds
 from fivebar_sim.metrics.measured import NOT_JUDGED
 from fivebar_sim.runs.side_by_side import side_by_side
+from fivebar_sim.scenario.leg_words import leg_words
 
 if TYPE_CHECKING:
     from fivebar_sim.regression.comparison import Checked, Row
@@ -44,7 +45,7 @@ def print_result(result: Result, where: str, console: Console) -> None:
     """Print one run: its metrics with their limits, the verdict, and the run directory."""
     window = result.measured.window
     title = (
-        f"{result.scenario.name}: {result.scenario.leg.name} leg, "
+        f"{result.scenario.name}: {leg_words(result.scenario.leg)}; "
         f"window {window.begin:.4g} to {window.end:.4g} s"
     )
     columns = ("metric", "window", "whole run", "limit", "verdict")

@@ -53,8 +53,8 @@ def page(runs: Sequence[StoredRun], drawn: list[Drawn]) -> str:
     summary = f"{len(runs)} runs: {', '.join(called)}. Differences are to the first."
     parts = [
         f"<header>\n<h1>{text('Comparison of runs')}</h1>\n<p>{text(summary)}</p>\n</header>",
-        html.section("Metrics", _metrics(runs)),
         html.section("What differs in the scenarios", _differences(runs)),
+        html.section("Metrics", _metrics(runs)),
         html.section("What happened", html.figures(drawn)),
     ]
     return html.page(f"Comparison of {', '.join(called)}", parts)

@@ -17,6 +17,7 @@ from fivebar_sim.report import draw
 from fivebar_sim.report.draw import Drawn
 from fivebar_sim.report.look import colour
 from fivebar_sim.runs.stored import StoredRun
+from fivebar_sim.scenario.leg_words import leg_words
 from fivebar_sim.workspace.survey import survey
 
 if TYPE_CHECKING:
@@ -124,7 +125,7 @@ def leg_moments(run: StoredRun) -> Drawn:
         f"the foot's path, the last one bold. Shaded: what the foot reaches in this working mode, "
         f"a shade deeper every {1e3 * deepest / BANDS:.3g} mm from the edge; teal: B, C and D in "
         "line.",
-        f"The leg {run.scenario.leg.name} in {len(rows)} poses along its foot path, over the "
+        f"The {leg_words(leg)} in {len(rows)} poses along its foot path, over the "
         "region that its foot reaches.",
         figure,
     )

@@ -17,6 +17,7 @@ from fivebar_sim.report.draw import Drawn
 from fivebar_sim.report.html import plain, text
 from fivebar_sim.runs.side_by_side import when
 from fivebar_sim.runs.stored import StoredRun
+from fivebar_sim.scenario.leg_words import leg_words
 
 
 def figures(run: StoredRun) -> list[Drawn]:
@@ -58,12 +59,14 @@ def _head(run: StoredRun) -> str:
     scenario = run.scenario
     window = scenario.window
     h = scenario.sim.timestep
+    words = leg_words(scenario.leg)
     about = (
-        f"The leg {scenario.leg.name} follows a path of kind {scenario.path.__struct_config__.tag} "
-        f"in the scene {scenario.scene.kind}, driven by the controller "
-        f"{scenario.controller_name}, for {scenario.duration:g} s in steps of {1e3 * h:g} ms. "
-        f"Tracking and load are measured in the window from {window.start * h:.4g} s to "
-        f"{window.stop * h:.4g} s, what is called (run) over the whole run."
+        f"The {words}{',' * (',' in words)} follows a path of kind "
+        f"{scenario.path.__struct_config__.tag} in the scene {scenario.scene.kind}, driven by the "
+        f"controller {scenario.controller_name}, for {scenario.duration:g} s in steps of "
+        f"{1e3 * h:g} ms. Tracking and load are measured in the window from "
+        f"{window.start * h:.4g} s to {window.stop * h:.4g} s, what is called (run) over the whole "
+        f"run."
     )
     tripped = [f'<p class="fail">{text(said)}</p>' for said in guards.tripped(run.measured.guards)]
     remark = tracking.astray(scenario.leg, run.record, window)

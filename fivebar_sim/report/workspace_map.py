@@ -13,6 +13,7 @@ from fivebar_sim.errors import ConfigError
 from fivebar_sim.files import whole_file
 from fivebar_sim.geometry import FiveBar
 from fivebar_sim.report.look import colour
+from fivebar_sim.scenario.leg_words import leg_words
 from fivebar_sim.workspace.survey import Map, survey
 
 if TYPE_CHECKING:
@@ -86,7 +87,7 @@ def _draw(ax: Axes, leg: FiveBar, surveyed: Map, path: Array | None) -> None:
         aspect="equal",
         xlabel="x [mm]",
         ylabel="z [mm]",
-        title=f"workspace of {leg.name}, working mode ({signs[0]}, {signs[1]})",
+        title=f"workspace of the {leg_words(leg)}\nworking mode ({signs[0]}, {signs[1]})",
     )
     ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.1), ncols=2, fontsize=8, frameon=False)
 
