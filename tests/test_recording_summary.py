@@ -10,6 +10,7 @@ from recorded import LEG, MEASURED, METRICS, ellipse, read, written
 
 from fivebar_sim.recording.summary import summary
 from fivebar_sim.scenario import Scenario
+from fivebar_sim.scenario.leg_words import leg_words
 
 LIMITS = {"tracking.rms": (-math.inf, 1e-3), "closure.max": (0.0, 1e-6), "load.share_A": (0.4, 0.6)}
 
@@ -33,12 +34,15 @@ def test_one_run_has_its_limits_its_metrics_and_its_provenance() -> None:
         "| loop gap max | undefined |",
         "| loop gap max (run) | 3 um |",
     ]
-    assert lines[-4:] == [
+    assert lines[-6:-2] == [
         "| branch flips (run) | 0 |",
         "| MuJoCo warnings (run) | 0 |",
         "",
         "*trot: mujoco 3.17, seed 0*",
     ]
+    assert lines[-1].startswith(
+        "**Colours**: motor A and L1 blue, L2 and angle B light blue, motor"
+    )
     assert "| load share A | undefined |" in lines
     assert not any("slip" in line for line in lines)  # there was no ground
 
@@ -51,12 +55,13 @@ def test_several_runs_stand_side_by_side() -> None:
     assert "| metric | a \\| b | calm |" in lines
     assert "| loop gap RMS (run) | 0.1 um | 2 um |" in lines
     assert "| slip in stance |  | 1 mm |" in lines
+    assert lines[-1] == "**Colours**: a \\| b blue, calm orange."
 
 
 def test_it_is_in_the_recording(tmp_path: Path) -> None:
     _, static = read(written(tmp_path / "a.rrd", LEG, ellipse(LEG, 5)))
     limits = Scenario.load("classic-ellipse").limits
-    text = summary(["round and round"], [MEASURED], [limits])
+    text = summary(["round and round"], [MEASURED], [limits], [leg_words(LEG)])
     assert static["/summary"]["TextDocument:text"] == [[text]]
 
 

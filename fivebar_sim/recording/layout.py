@@ -20,8 +20,6 @@ if TYPE_CHECKING:
     from rerun.encodings import EntityPathLike
 
 SUMMARY = "summary"
-LEGEND = 8
-"""Largest number of lines for which a plot has a legend: a longer one hides the plot."""
 
 
 def contents(
@@ -82,10 +80,11 @@ def _ago(age: float) -> int:
 
 
 def plot_view(plot: Series, looks: Sequence[Look]) -> rrb.TimeSeriesView:
-    """Return the view of one plot with the lines of all runs, and a legend if it helps."""
-    import rerun.blueprint as rrb
+    """Return the view of one plot with the lines of all runs.
 
-    count = len(looks) * len(plot.lines)
+    Rerun draws a legend over the curves, so there is none: the summary says what the colours mean.
+    """
+    import rerun.blueprint as rrb
 
     return rrb.TimeSeriesView(
         origin="/",
@@ -93,7 +92,7 @@ def plot_view(plot: Series, looks: Sequence[Look]) -> rrb.TimeSeriesView:
         name=plot.title,
         axis_x=rrb.TimeAxis(link="LinkToGlobal"),
         axis_y=rrb.ScalarAxis(range=plot.bounds) if plot.bounds else None,
-        plot_legend=rrb.PlotLegend(visible=1 < count <= LEGEND),
+        plot_legend=rrb.PlotLegend(visible=False),
     )
 
 

@@ -105,9 +105,20 @@ def _log_base(stream: rr.RecordingStream, leg: FiveBar, look: Look) -> None:
     import rerun as rr
 
     r = leg.radius
-    for joint, base, y in zip("AE", bases(leg), (-3.5 * r, 3.5 * r), strict=True):
-        motor = _axle((base[0], y, base[1]), 3.0 * r, 2.0 * r, joint, GREY, look)
+    for joint, base, side in zip("AE", bases(leg), (-1.0, 1.0), strict=True):
+        centre = (base[0], 3.5 * side * r, base[1])
+        motor = _axle(centre, 3.0 * r, 2.0 * r, None, shade(joint), look)
         stream.log(f"{look.root}{HIP}/{joint}", motor, static=True)
+        # Apart from the motors, since those of a coaxial leg are at one place.
+        if not look.label:
+            letter = rr.Points3D(
+                in_space([base + np.array([5.0 * side * r, 5.0 * r])]),
+                radii=[0.1 * r],
+                colors=[shade(joint)],
+                labels=[joint],
+                show_labels=True,
+            )
+            stream.log(f"{HIP}/letter_{joint}", letter, static=True)
 
     if leg.L5 > 0.0:
         bar = rr.Capsules3D(
@@ -143,7 +154,7 @@ def _axle(
     centre: tuple[float, float, float],
     width: float,
     radius: float,
-    joint: str,
+    joint: str | None,
     colour: Colour,
     look: Look,
 ) -> rr.Cylinders3D:
@@ -157,7 +168,7 @@ def _axle(
         centers=[centre],
         quaternions=[ACROSS],
         colors=[look.colour(colour)],
-        labels=None if look.label else [joint],
+        labels=None if look.label or joint is None else [joint],
         fill_mode="solid",
     )
 

@@ -22,6 +22,7 @@ from fivebar_sim.recording import viewer as recording_viewer
 from fivebar_sim.recording.look import Look
 from fivebar_sim.recording.plots import Series, series
 from fivebar_sim.recording.poses import DrawnMotion, Room, drawn_motion, room_of
+from fivebar_sim.recording.summary import colours
 from fivebar_sim.scenario.scenes import Ground
 from fivebar_sim.simulation.plan import Plan
 from fivebar_sim.simulation.record import columns
@@ -219,6 +220,7 @@ class _Sender:
         layout.send(stream, layout.contents(self._room, [look], [plots]))
         rrd.log_room(stream, self._room)
         text = f"# {planned.scenario.name}\n\nNo verdict yet: shown while it is simulated."
+        text = f"{text}\n\n{colours([planned.scenario.name])}\n"
         stream.log(layout.SUMMARY, _markdown(text), static=True)
         scene.log_leg(stream, planned.scenario.leg, look)
         foot.log_foot(stream, planned.motion.foot[1:], look)

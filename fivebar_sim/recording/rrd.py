@@ -34,6 +34,7 @@ from fivebar_sim.recording.poses import (
     room_of,
 )
 from fivebar_sim.recording.summary import summary
+from fivebar_sim.scenario.leg_words import leg_words
 
 if TYPE_CHECKING:
     import rerun as rr
@@ -144,7 +145,12 @@ def _send(stream: rr.RecordingStream, runs: Sequence[Run], names: list[str]) -> 
     moved = [drawn_motion(run.record, drawn_rows(run.record["time"])) for run in runs]
     plots = [list(series(run.scenario, run.record)) for run in runs]
     room = room_of([run.scenario.leg for run in runs], moved)
-    text = summary(names, [run.measured for run in runs], [run.scenario.limits for run in runs])
+    text = summary(
+        names,
+        [run.measured for run in runs],
+        [run.scenario.limits for run in runs],
+        [leg_words(run.scenario.leg) for run in runs],
+    )
     layout.send(stream, layout.contents(room, shown, plots))
     stream.log(layout.SUMMARY, rr.TextDocument(text, media_type="text/markdown"), static=True)
     log_room(stream, room)

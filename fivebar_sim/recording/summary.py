@@ -9,23 +9,42 @@ from fivebar_sim.metrics import guards
 from fivebar_sim.metrics.catalogue import LISTED, SHOWN, shown
 from fivebar_sim.metrics.limits import Limit, bounds, judge, look_up
 from fivebar_sim.metrics.measured import Judged
+from fivebar_sim.render import palette
+
+MEANINGS = (
+    ("motor A and L1", "A"),
+    ("L2 and angle B", "B"),
+    ("motor E and L4", "E"),
+    ("L3 and angle D", "D"),
+    ("target", "target"),
+    ("foot and its error", "foot"),
+    ("the ground's force", "force"),
+    ("torque limits", "muted"),
+)
+"""What has which colour of the palette."""
 
 
 def summary(
     labels: Sequence[str],
     found: Sequence[Judged],
     limits: Sequence[Mapping[str, tuple[float, float]]],
+    legs: Sequence[str] = (),
 ) -> str:
     """Return Markdown: verdict, tripped guards and limits of every run; then the metrics.
+
+    What the colours mean comes last: a legend would lie over the curves.
 
     Args:
         labels: What each run is called.
         found: What was measured and judged of each.
         limits: (low, high) of each by the metric's dotted key.
+        legs: What the leg of each is in words; by default nothing.
     """
     lines: list[str] = []
+    about = dict(zip(labels, legs, strict=False))
     for label, measured, own in zip(labels, found, limits, strict=True):
         lines += [f"## {_cell(label)}: {measured.verdict.upper()}", ""]
+        lines += [_cell(about[label]), ""] if label in about else []
         tripped = [f"- {said}" for said in guards.tripped(measured.guards)]
         lines += [*tripped, ""] if tripped else []
         lines += [*_limits(_judge_all(measured.table, own)), ""]
@@ -41,7 +60,18 @@ def summary(
     for label, measured in zip(labels, found, strict=True):
         facts = ", ".join(f"{key} {_cell(value)}" for key, value in measured.provenance.items())
         lines += ["", f"*{_cell(label)}: {facts}*"]
+    lines += ["", colours(labels)]
     return "\n".join(lines) + "\n"
+
+
+def colours(labels: Sequence[str]) -> str:
+    """Return one line of Markdown: what the colours of leg and plots mean, or those of the runs."""
+    if len(labels) > 1:
+        words = [palette.RUNS[k % len(palette.RUNS)].word for k in range(len(labels))]
+        named = zip(labels, words, strict=True)
+        return f"**Colours**: {', '.join(f'{_cell(label)} {word}' for label, word in named)}."
+    said = [f"{what} {palette.COLOURS[name].word}" for what, name in MEANINGS]
+    return f"**Colours**: {', '.join(said)}; what the motors are sent white (A) and grey (E)."
 
 
 def _judge_all(
