@@ -30,7 +30,8 @@ FIGURES = """() => [...document.querySelectorAll('figure')].map(figure => {
     const letters = all('text').map(text => text.getBoundingClientRect());
     return {
         width: box.width, height: box.height, lines: lines.length, letters: letters.length,
-        outside: letters.filter(b => b.left < box.left - 3 || b.right > box.right + 3).length,
+        outside: letters.filter(b => b.left < box.left - 3 || b.right > box.right + 3
+            || b.top < box.top - 3 || b.bottom > box.bottom + 3).length,
         smallest: Math.min(...letters.filter(b => b.width >= b.height).map(b => b.height)),
     };
 })"""

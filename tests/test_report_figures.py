@@ -11,7 +11,8 @@ from fivebar_controllers.pd import Pd
 from judged import judged
 from msgspec.structs import replace
 
-from fivebar_sim import rollout
+from fivebar_sim import FiveBar, kinematics, rollout
+from fivebar_sim.metrics.columns import JOINT_COLUMNS
 from fivebar_sim.report import axes, comparison, draw, in_plane, look, motors, numbers, over_time
 from fivebar_sim.runs.stored import StoredRun
 from fivebar_sim.scenario import Scenario
@@ -227,6 +228,28 @@ def test_moments_are_evenly_along_the_way(ellipse: StoredRun, landing: StoredRun
     times = ellipse.record["time"][in_plane.moments(ellipse)]
     np.testing.assert_allclose(times[[0, -1]], [0.251, 0.751], atol=0.002)
     assert landing.record["time"][in_plane.moments(landing)[0]] < 0.15
+
+
+def test_letters_of_the_joints_are_apart(ellipse: StoredRun) -> None:
+    """Also A and E of a coaxial leg; A is to the left of E."""
+    coaxial = replace_leg(ellipse, FiveBar(L1=0.04, L2=0.06, L3=0.06, L4=0.04, L5=0.0))
+    for run in (ellipse, coaxial):
+        with look.project_style():
+            figure = in_plane.leg_moments(run).figure
+            figure.canvas.draw()
+        letters = {text.get_text(): text.get_window_extent() for text in figure.axes[0].texts}
+        assert list(letters) == list("ABCDE")
+        for one, other in itertools.combinations(letters.values(), 2):
+            assert not one.overlaps(other)
+        assert letters["A"].x1 < letters["E"].x0
+
+
+def replace_leg(run: StoredRun, leg: FiveBar) -> StoredRun:
+    """Return a run that holds another leg in its rest pose."""
+    record = dict(run.record)
+    for name, angle in zip(JOINT_COLUMNS, kinematics.home(leg), strict=True):
+        record[name] = np.full(len(record["time"]), float(angle))
+    return run._replace(scenario=replace(run.scenario, leg=leg), record=record)
 
 
 def test_ground_is_drawn_only_where_there_is_one(ellipse: StoredRun, landing: StoredRun) -> None:

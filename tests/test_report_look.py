@@ -127,6 +127,12 @@ def test_text_is_escaped_once() -> None:
     assert "<title>&lt;i&gt;</title>" in html.page("<i>", [])
 
 
+def test_only_long_lines_of_a_table_wrap() -> None:
+    cells = ["0.1188 um", html.Cell("3.338 mN m<small>+12.5 points</small>"), "a" * 17, "&" * 16]
+    table = html.table("", ["", *"1234"], [["row", *cells]])
+    assert re.findall(r'<td class="(\w+)"', table) == ["number", "number", "words", "number"]
+
+
 def test_plain_values() -> None:
     values = [True, None, 0.123456789, [1, 2.0], [], "a"]
     assert [html.plain(v) for v in values] == ["yes", "none", "0.12346", "1, 2", "none", "a"]

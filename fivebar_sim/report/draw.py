@@ -105,8 +105,10 @@ def plane(height: float) -> tuple[Figure, Axes]:
         height: Height of the figure [in].
     """
     from matplotlib.figure import Figure
+    from matplotlib.layout_engine import ConstrainedLayoutEngine
 
-    figure = Figure(figsize=(WIDTH, height), layout="constrained")
+    # Equal scales change the ticks after the layout: half a letter of one may come to stand above.
+    figure = Figure(figsize=(WIDTH, height), layout=ConstrainedLayoutEngine(h_pad=0.1))
     ax = figure.add_subplot()
     ax.set(aspect="equal", xlabel="x [mm]", ylabel="z [mm]")
     # Equal scales by wider limits: the panel keeps its size beside another one.

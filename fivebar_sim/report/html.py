@@ -41,6 +41,7 @@ th { font-weight: 600; overflow-wrap: anywhere; }
 tbody th { font-weight: 400; }
 .number { text-align: right; white-space: nowrap; }
 td code { white-space: normal; font-size: .8em; }
+.words { text-align: right; }
 .words, thead .number { overflow-wrap: anywhere; white-space: normal; }
 details { margin: .75rem 0; }
 summary { cursor: pointer; font-weight: 600; }
@@ -155,8 +156,9 @@ def table(caption: str, head: Sequence[object], rows: Iterable[Sequence[object]]
 
 def _class(cell: object) -> str:
     """Return the class of a cell: long text wraps, or its table would be wider than the page."""
-    letters = unescape(re.sub(r"<[^>]*>", "", text(cell)))
-    return ' class="number"' if len(letters) <= LONGEST else ' class="words"'
+    # What is small stands on a line of its own.
+    lines = [unescape(re.sub(r"<[^>]*>", "", line)) for line in text(cell).split("<small>")]
+    return ' class="number"' if max(map(len, lines)) <= LONGEST else ' class="words"'
 
 
 def key(name: str) -> Cell:

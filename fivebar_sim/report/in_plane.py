@@ -136,7 +136,9 @@ def _letter(ax: Axes, joints: dict[str, Array]) -> None:
     middle = np.mean(list(joints.values()), axis=0)
     for letter, point in joints.items():
         away = point - middle
-        # Never two joints at one place and in the middle: a leg has links.
+        # Coaxial motors are at one place: one letter stands to the left and one to the right.
+        if letter in "AE" and np.array_equal(joints["A"], joints["E"]):
+            away = np.array([-1.0 if letter == "A" else 1.0, 1.0])
         offset = BESIDE * away / max(float(np.hypot(*away)), 1e-12)
         ax.annotate(
             letter,
