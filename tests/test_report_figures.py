@@ -286,6 +286,20 @@ def test_difference(
     assert comparison.difference(key, valued(value), valued(first)) == said
 
 
+def test_overlaid_torques_are_scaled_by_the_windows(ellipse: StoredRun, landing: StoredRun) -> None:
+    """The landing's torque before its window is five times what is measured."""
+    with look.project_style():
+        drawn = {one.key: one for one in comparison.figures([landing, ellipse])}
+    ax = drawn["torque"].figure.axes[0]
+    window = landing.scenario.window
+    measured = 1e3 * np.abs(landing.record["torque_A"][window]).max()
+    assert measured < ax.get_ylim()[1] < 1.2 * measured
+    assert axes.CUT in drawn["torque"].caption
+    assert "1128" in [text.get_text() for text in ax.texts]
+    assert axes.CUT not in drawn["ground"].caption
+    assert drawn["ground"].figure.axes[0].get_ylim()[1] > landing.record["ground_z"].max()
+
+
 def test_overlaid_gaps_are_on_a_scale_by_powers(ellipse: StoredRun, landing: StoredRun) -> None:
     runs = [ellipse, landing._replace(path=Path("_two")), ellipse._replace(path=Path("three"))]
     with look.project_style():

@@ -15,6 +15,7 @@ from fivebar_sim.metrics.limits import bounds, look_up
 from fivebar_sim.metrics.measured import NOT_JUDGED
 from fivebar_sim.metrics.tracking import tracking_error
 from fivebar_sim.recording.plots import points
+from fivebar_sim.report import axes as scaled
 from fivebar_sim.report import draw, html, numbers
 from fivebar_sim.report.draw import Drawn
 from fivebar_sim.report.html import Cell, plain, text
@@ -120,6 +121,8 @@ def _lines(
     figure, axes = draw.panels(
         *[1.0] * len(columns), height=0.7 + 2.0 * len(columns) + NAME * len(runs)
     )
+    cut = False
+    axes[-1].set_xlim(0.0, max(float(run.record["time"][-1]) for run in runs))
     for ax, (label, column) in zip(axes, columns.items(), strict=True):
         ax.set_ylabel(label)
         for k, run in enumerate(runs):
@@ -128,12 +131,22 @@ def _lines(
             ax.plot(run.record["time"][rows], values[rows], gid="run", **_look(k, runs))
         if worst:
             _by_powers(ax, [float(column(run).max()) for run in runs])
+        # The ground's metrics are of the whole run.
+        elif key != "ground":
+            cut |= _by_measured(ax, runs, column)
 
-    axes[-1].set_xlim(0.0, max(float(run.record["time"][-1]) for run in runs))
     _legend(figure, axes[0], names(runs))
     alt = f"Lines over time of {', '.join(names(runs))}: {', '.join(columns)}."
 
-    return Drawn(key, title, caption, alt, figure)
+    return Drawn(key, title, caption + scaled.CUT * cut, alt, figure)
+
+
+def _by_measured(ax: Axes, runs: Sequence[StoredRun], column: Column) -> bool:
+    """Scale an axis by what all runs measured; return whether a line is cut."""
+    ends = [scaled.measured_range(run, column(run)) for run in runs]
+    ax.set_ylim(min(low for low, _ in ends), max(high for _, high in ends))
+    cut = [scaled.mark_cut(ax, run, column(run)) for run in runs]
+    return any(cut)
 
 
 def _by_powers(ax: Axes, peaks: Sequence[float]) -> None:
