@@ -44,12 +44,20 @@ def test_the_model_has_the_colours_of_its_sides() -> None:
 def test_reports_and_recordings_have_the_shades_of_the_palette() -> None:
     for name, shades in palette.COLOURS.items():
         assert look.COLOURS[name] == (shades.light, shades.dark)
-        assert recording_look.shade(name) == palette.rgb(shades.dark)
-    runs = [look.COLOURS[f"run-{k + 1}"][1] for k in range(len(palette.RUNS))]
-    assert [palette.rgb(colour) for colour in runs] == list(recording_look.TINTS)
+    for k, shades in enumerate(palette.RUNS):
+        assert look.COLOURS[f"run-{k + 1}"] == (shades.light, shades.dark)
     assert palette.unit_rgb(palette.COLOURS["target"].light) == scene.TARGET
     assert palette.unit_rgb(palette.COLOURS["foot"].light) == scene.FOOT
     assert palette.unit_rgb(palette.COLOURS["force"].light) == scene.FORCE
+
+
+def test_lines_of_a_recording_are_seen_on_light_and_on_dark_plots() -> None:
+    """Rerun's theme is its user's choice, and follows the system in a browser."""
+    assert palette.contrast((0, 0, 0), (255, 255, 255)) == pytest.approx(21.0)
+    drawn = [recording_look.shade(name) for name in palette.COLOURS]
+    for colour in (*drawn, *recording_look.TINTS):
+        for paper in palette.PAPER[:2]:
+            assert palette.contrast(colour, palette.rgb(paper)) >= 3.0
 
 
 @pytest.mark.parametrize(

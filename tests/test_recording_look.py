@@ -25,7 +25,8 @@ def test_motors_of_a_recording_have_their_letters_and_colours(tmp_path: Path) ->
         assert z - base[1] > 3.0 * LEG.radius
         red, green, blue = shade(motor)
         packed = (red << 24) + (green << 16) + (blue << 8) + 255
-        assert letter["Points3D:colors"] == [[packed]]
+        # a colour would not stand out from the grey that Rerun writes on
+        assert letter["Points3D:colors"] == [[0xFFFFFFFF]]
         assert static[f"/hip/{motor}"]["Cylinders3D:colors"] == [[packed]]
 
 

@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 from fivebar_sim.arrays import Array
 from fivebar_sim.geometry import FiveBar
 from fivebar_sim.kinematics import bases, chain_points
-from fivebar_sim.recording.look import GREY, LIGHT_GREY, Colour, Look, shade
+from fivebar_sim.recording.look import GREY, PIN, Colour, Look, shade
 from fivebar_sim.recording.poses import DrawnMotion, in_height
 
 if TYPE_CHECKING:
@@ -86,7 +86,7 @@ def log_leg(stream: rr.RecordingStream, leg: FiveBar, look: Look) -> None:
         ("C", "L2", leg.L2, 0.0, 4.8 * r),
         ("D", "L4", leg.L4, r, 2.8 * r),
     ):
-        pin = _axle((length, y, 0.0), width, 0.6 * r, joint, LIGHT_GREY, look)
+        pin = _axle((length, y, 0.0), width, 0.6 * r, joint, PIN, look)
         stream.log(f"{hip}/{link}/{joint}", pin, static=True)
 
     foot = rr.Ellipsoids3D(
@@ -114,7 +114,7 @@ def _log_base(stream: rr.RecordingStream, leg: FiveBar, look: Look) -> None:
             letter = rr.Points3D(
                 in_space([base + np.array([5.0 * side * r, 5.0 * r])]),
                 radii=[0.1 * r],
-                colors=[shade(joint)],
+                colors=[PIN],
                 labels=[joint],
                 show_labels=True,
             )

@@ -10,15 +10,18 @@ Colour = palette.Rgb
 
 
 def shade(name: str) -> Colour:
-    """Return a colour of the palette in its shade for dark paper, since Rerun's views are dark."""
-    return palette.rgb(palette.COLOURS[name].dark)
+    """Return a colour of the palette; Rerun's plots are light or dark, as its user likes them."""
+    return palette.on_any_paper(palette.COLOURS[name])
 
 
 GREY = (96, 96, 102)
 LIGHT_GREY = (140, 140, 148)
 """Floor, belt and base, which lie behind all others."""
 
-TINTS: tuple[Colour, ...] = tuple(palette.rgb(shades.dark) for shades in palette.RUNS)
+PIN = (255, 255, 255)
+"""Pins and letters, which Rerun writes on a patch of grey or, with its dark theme, on black."""
+
+TINTS: tuple[Colour, ...] = tuple(palette.on_any_paper(shades) for shades in palette.RUNS)
 """The colours of runs that are shown together; the ninth run has the first colour again."""
 TINTED = 0.7
 """Fraction of a run's own colour where several runs are shown; the rest is the part's colour."""

@@ -50,9 +50,7 @@ MOTOR_COLOURS: dict[str, Colour] = {motor: shade(motor) for motor in MOTORS}
 ANGLE_COLOURS: dict[str, Colour] = {
     name: shade(name.removeprefix("theta_")) for name in JOINT_COLUMNS
 }
-COMMAND_COLOURS: dict[str, Colour] = dict(
-    zip(COMMAND_COLUMNS, (shade("ink"), shade("muted")), strict=True)
-)
+COMMAND_COLOURS: dict[str, Colour] = dict.fromkeys(COMMAND_COLUMNS, shade("muted"))
 
 
 def series(scenario: Scenario, record: Record) -> Iterator[Series]:

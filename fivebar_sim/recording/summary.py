@@ -19,7 +19,7 @@ MEANINGS = (
     ("target", "target"),
     ("foot and its error", "foot"),
     ("the ground's force", "force"),
-    ("torque limits", "muted"),
+    ("torque limits, and what the motors are sent", "muted"),
 )
 """What has which colour of the palette."""
 
@@ -71,7 +71,7 @@ def colours(labels: Sequence[str]) -> str:
         named = zip(labels, words, strict=True)
         return f"**Colours**: {', '.join(f'{_cell(label)} {word}' for label, word in named)}."
     said = [f"{what} {palette.COLOURS[name].word}" for what, name in MEANINGS]
-    return f"**Colours**: {', '.join(said)}; what the motors are sent white (A) and grey (E)."
+    return f"**Colours**: {', '.join(said)}."
 
 
 def _judge_all(

@@ -59,6 +59,9 @@ TIME = ("#0f8a8a", "#6f78c4", "#a765c4", "#d0588e")
 
 Rgb = tuple[int, int, int]
 
+VISIBLE = 3.0
+"""Least contrast of a line with its paper, as WCAG 2 asks for."""
+
 
 def rgb(colour: str) -> Rgb:
     """Return red, green and blue of "#rrggbb", 0 to 255."""
@@ -70,3 +73,33 @@ def unit_rgb(colour: str) -> tuple[float, float, float]:
     """Return red, green and blue of "#rrggbb", 0 to 1."""
     red, green, blue = rgb(colour)
     return red / 255.0, green / 255.0, blue / 255.0
+
+
+def luminance(colour: Rgb) -> float:
+    """Return the relative luminance of a colour, 0 to 1, as WCAG 2 defines it."""
+    shares = [part / 255.0 for part in colour]
+    linear = [s / 12.92 if s <= 0.04045 else ((s + 0.055) / 1.055) ** 2.4 for s in shares]
+    return 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2]
+
+
+def contrast(one: Rgb, other: Rgb) -> float:
+    """Return the contrast of two colours, 1 to 21."""
+    dark, light = sorted([luminance(one), luminance(other)])
+    return (light + 0.05) / (dark + 0.05)
+
+
+def on_any_paper(shades: Shades) -> Rgb:
+    """Return the shade that is seen on light and on dark paper: Rerun's plots may have either.
+
+    It is the light one, mixed with as little of the dark one as makes it `VISIBLE` on dark paper.
+    """
+    light = rgb(shades.light)
+    dark = rgb(shades.dark)
+    paper = rgb(PAPER.dark)
+    for percent in range(100):
+        red, green, blue = (
+            round(a + 0.01 * percent * (z - a)) for a, z in zip(light, dark, strict=True)
+        )
+        if contrast((red, green, blue), paper) >= VISIBLE:
+            return red, green, blue
+    return dark
