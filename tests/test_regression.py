@@ -67,6 +67,7 @@ def test_what_may_not_fall_either_is_known() -> None:
     assert both == [
         "ground.flight_max",
         "ground.foot_height_max",
+        "ground.foot_share",
         "ground.force_max.x",
         "ground.force_max.z",
         "ground.stance_share",
