@@ -103,7 +103,7 @@ def print_convergence(
     h = found.timesteps[0]
     title = f"{scenario.name}: {found.integrator}, h = {1e3 * h:g} ms and finer"
     beside = [] if other is None else [other.integrator]
-    table = _table(escape(title), ["metric", "at h", "limit", "order", "error", *beside, ""], gap=0)
+    table = _table(escape(title), ["metric", "at h", "limit", "order", "error", *beside, ""])
     for key, each in found.metrics.items():
         order = "" if each.order is None else f"{each.order:.1f}"
         error = "undefined" if each.error is None else f"{1e2 * each.error:.1f} %"
