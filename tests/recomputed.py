@@ -208,8 +208,15 @@ def _ground(run: Run) -> Found:
         "ground.stance_share": np.count_nonzero(down[run.rows]) / len(down[run.rows]),
         "ground.slip": slid[run.rows][down[run.rows]].sum(),
         "ground.foot_height_max": height.max(),
+        "ground.foot_share": _part(r["ground_z"][run.rows].sum(), r["rail_end"][run.rows].sum()),
+        "ground.rail_end_max": r["rail_end"].max(),
         "ground.flight_max": max(map(len, flights)) * run.h,
     }
+
+
+def _part(one: float, other: float) -> float | None:
+    """Return one amount as a part of both, None if there is nothing of either."""
+    return float(one / (one + other)) if one + other > 0.0 else None
 
 
 def _branch(run: Run) -> Found:

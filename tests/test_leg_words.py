@@ -49,4 +49,6 @@ def test_every_number_of_a_leg_has_a_unit_or_needs_none() -> None:
 def test_console_says_what_differs(shell: Shell) -> None:
     (shell.folder / "short.toml").write_text(ELLIPSE, encoding="utf-8")
     said = shell("run", "short.toml", "--set", "leg={preset='classic',L2=0.062}")
-    assert said.out.splitlines()[0].strip() == "short: classic leg, L2 = 62 mm"
+    assert said.out.splitlines()[0].strip() == (
+        "short: classic leg, L2 = 62 mm; window 0.1 to 0.6 s"
+    )

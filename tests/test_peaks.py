@@ -118,7 +118,7 @@ def named(rows: list[Row], label: str) -> list[Row]:
 def test_the_whole_runs_peak_stands_beside_the_windows_with_its_time() -> None:
     rows = table()
     assert named(rows, "torque A peak") == [
-        Row("torque A peak", "179.1 mN m", "1128 at 0.111 s", "", True)
+        Row("torque A peak", "179.1 mN m", "1.128 N m at 0.111 s", "", True)
     ]
     # another unit than the window's is written out
     assert named(rows, "power E peak") == [
@@ -133,15 +133,15 @@ def test_the_whole_runs_peak_stands_beside_the_windows_with_its_time() -> None:
 @pytest.mark.parametrize(
     ("limits", "wanted"),
     [
-        ([("load.torque_peak.A", 2.0)], [("<= 2000 mN m", True)]),
-        ([("whole.torque_peak.A", 1.0)], [("run <= 1000 mN m", False)]),
+        ([("load.torque_peak.A", 2.0)], [("<= 2 N m", True)]),
+        ([("whole.torque_peak.A", 1.0)], [("run <= 1 N m", False)]),
         (
             [("whole.torque_peak.A", 1.0), ("load.torque_peak.A", 2.0)],
-            [("<= 2000 mN m", True), ("<= 1000 mN m", False)],
+            [("<= 2 N m", True), ("<= 1 N m", False)],
         ),
         (
             [("torque_peak.A", 2.0)],  # the same number under another key: a row of its own
-            [("", True), ("<= 2000 mN m", True)],
+            [("", True), ("<= 2 N m", True)],
         ),
     ],
 )
@@ -152,7 +152,7 @@ def test_a_limit_says_which_of_the_two_it_is_on(
     assert [(row.limit, row.ok) for row in rows] == wanted
     assert rows[0].window == "179.1 mN m"
     if len(limits) == 2:
-        assert (rows[1].window, rows[1].run) == ("", "1128 mN m at 0.111 s")
+        assert (rows[1].window, rows[1].run) == ("", "1.128 N m at 0.111 s")
 
 
 def test_small_powers_and_speeds_get_smaller_units() -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+import numpy as np
 import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
@@ -20,6 +21,9 @@ from fivebar_sim.scenario import Scenario
 
 SCENARIO = Scenario.load("rail-hop")
 KEYS = sorted(ABSOLUTE)
+COLUMNS = ("foot_x", "foot_z", "target_x", "target_z")
+AT_REST = dict.fromkeys(COLUMNS, np.zeros(SCENARIO.steps))
+"""What a result's warnings look at."""
 
 
 def result(
@@ -31,7 +35,7 @@ def result(
 ) -> Result:
     """Return a result with some metrics."""
     measured = judged(values, guards=guards, provenance=provenance)
-    return Result(SCENARIO, {}, measured, metrics.judge(measured.table, limits or {}))
+    return Result(SCENARIO, AT_REST, measured, metrics.judge(measured.table, limits or {}))
 
 
 def recorded(values: dict[str, float | None], relative: float = RELATIVE) -> Baseline:

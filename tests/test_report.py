@@ -127,7 +127,7 @@ def test_guards_are_folded_to_a_line_and_open_if_one_trips(
     for guard in guards:
         (row,) = (row for row in page.rows() if row[0].startswith(f"{guard.name}: "))
         assert len(row[0].split()) > 4
-        assert re.fullmatch(r"undefined|[\d.e-]+ (mm|deg|%|flips|steps)", row[1])
+        assert re.fullmatch(r"undefined|[\d.e-]+ (mm|deg|N|%|flips|steps)", row[1])
         assert row[2] == ("pass" if guard.ok else "FAIL")
     sentence = "torque: a motor's torque had been clipped for more than 50 % of a second"
     assert any(row[0] == sentence for row in page.rows())

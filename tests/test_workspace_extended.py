@@ -18,7 +18,7 @@ from extended_legs import (
     search,
 )
 
-from fivebar_sim import kinematics, motion, workspace
+from fivebar_sim import kinematics, motion, units, workspace
 from fivebar_sim.arrays import Array, Bools
 from fivebar_sim.errors import ArgumentError, GeometryError, UnreachableError
 from fivebar_sim.geometry import MODES, FiveBar
@@ -190,7 +190,7 @@ def test_path_out_of_reach_names_the_nearest_point_of_its_own_mode() -> None:
     assert workspace.reachable(BENT, lost)
     out = -workspace.distance(BENT, lost, mode=BENT.mode)
     assert out > 0.0
-    assert f"is {1e3 * out:.3g} mm out" in str(error.value)
+    assert f"is {units.text(1e3 * out, 'mm', 3)} out" in str(error.value)
 
 
 # refusal

@@ -213,6 +213,7 @@ CATALOGUE = (
         hidden_at_zero=True,
         function=ground.rail_end_max,
         low=0.0,
+        window=RUN,
     ),
     # Works and gains of the whole run: the guard of the energy balances them.
     Metric("energy.motor", "work of the motors", 1e3, "mJ", detail=True, window=RUN),

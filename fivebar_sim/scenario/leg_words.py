@@ -15,6 +15,7 @@ UNITS = {
     **dict.fromkeys(("bend", "tilt"), DEGREES),
     "mass": (1e3, " g"),
     "com": MM,
+    "com_across": MM,
     "inertia": (1e9, " g mm2"),
     "density": (1.0, " kg/m3"),
     "armature": (1e9, " g mm2"),
