@@ -250,6 +250,7 @@ def test_side_may_differ_from_point_to_point() -> None:
     [
         ((0.0, 0.02, 0.02), r"at least 0.03 m from the hip's axis, got 0.0282843 m"),
         ((0.0, 0.0, 0.0), "got 0 m"),
+        ((0.001, 0.003, 0.004), r"got 0.005 m for the foot at \(0.001, 0.003, 0.004\) m"),
         ((0.0, math.nan, -0.04), "must be finite"),
         ((math.inf, 0.03, -0.04), "must be finite"),
         ((0.0, 0.03, -0.2), r"in the leg plane .*\|AF\| must be in"),

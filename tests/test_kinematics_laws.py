@@ -23,6 +23,7 @@ from fivebar_sim.errors import (
 from fivebar_sim.files import resources
 from fivebar_sim.geometry import MODES, FiveBar, Mode
 from fivebar_sim.kinematics import planar, stops
+from fivebar_sim.kinematics.reach import points_at
 
 PRESETS = [FiveBar.load(name) for name in resources.shipped("models/legs")]
 CLASSIC = FiveBar.load("classic")
@@ -75,6 +76,49 @@ def test_home_of_a_leg_that_is_never_there_is_the_best_of_the_plane() -> None:
     assert least_sine(SIDEWAYS, F[None])[0] == pytest.approx(
         least_sine(SIDEWAYS, plane).max(), abs=2e-9
     )
+
+
+@pytest.mark.parametrize("leg", LEGS, ids=lambda leg: f"{leg.name}{leg.mode}{leg.assembly}")
+def test_hanging_is_the_best_pose_below_the_hip_in_the_turns_of_home(leg: FiveBar) -> None:
+    rest = kinematics.home(leg)
+    line = (leg.size + leg.L5) / 60.0 * np.arange(-60.0, 61.0)
+    plane = np.stack(np.meshgrid(line, line[:60]), axis=-1)
+    # Straight below the hip, or anywhere below it if it is never there.
+    below = least_sine(leg, plane[:, 60]).max() or least_sine(leg, plane.reshape(-1, 2)).max()
+    q = kinematics.hanging(leg)
+    if kinematics.chain_points(leg, rest).F[1] < 0.0 or below == 0.0:
+        np.testing.assert_array_equal(q, rest)
+        return
+
+    p = kinematics.chain_points(leg, q)
+    assert p.F[1] < 0.0
+    assert kinematics.branch(leg, p) == (*leg.mode, leg.assembly)
+    assert least_sine(leg, p.F[None])[0] == pytest.approx(below, abs=2e-9)
+    for (low, high), angle in (
+        (stops.stops_at_B(leg, rest), q[1]),
+        (stops.stops_at_C(rest), stops.angle_at_C(q)),
+    ):
+        assert low < angle < high
+    q[:] = 0.0
+    assert kinematics.hanging(leg).any()  # nobody writes into another's pose
+
+
+@pytest.mark.parametrize("leg", [CLASSIC, RIGID], ids=["classic", "rigid"])
+def test_stops_at_B_are_where_the_foot_is_folded_back_over_the_motor(leg: FiveBar) -> None:
+    """About every rest pose, in all turns: BF then points from B to A."""
+    for theta_B in np.linspace(-9.0, 9.0, 37):
+        low, high = stops.stops_at_B(leg, np.array([0.3, theta_B, 0.0, 0.0]))
+        assert low <= theta_B <= high
+        assert high - low == pytest.approx(math.tau, abs=1e-14)
+        p = kinematics.chain_points(leg, np.array([0.3, high, 0.0, 0.0]))
+        BA = kinematics.bases(leg)[0] - p.B
+        np.testing.assert_allclose((p.F - p.B) / length(p.F - p.B), BA / leg.L1, rtol=0, atol=1e-14)
+
+
+def test_points_of_a_known_foot_are_those_of_its_joints() -> None:
+    foot, theta = sample(RIGID, (20,))
+    for found, point in zip(points_at(RIGID, foot, theta), pose(RIGID, foot, theta), strict=True):
+        np.testing.assert_allclose(found, point, rtol=0, atol=1e-15)
 
 
 def test_stops_hold_the_angle_at_C_between_two_poses_in_line() -> None:

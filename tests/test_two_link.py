@@ -240,6 +240,7 @@ def test_no_rate_at_full_stretch(h_dot: float) -> None:
         with pytest.raises(SingularError, match="the leg is stretched") as error:
             CROUCH.rates(q1, h_dot)
         assert error.value.index == index
+        assert str(error.value).endswith(f" at index {index}" if index else "2.4e-07")
     np.testing.assert_allclose(CROUCH.rates(0.5 * np.pi, -0.1), [1.0, -2.0], rtol=1e-15)
 
 
@@ -262,6 +263,17 @@ def test_crouch_out_of_reach(h: float) -> None:
     with pytest.raises(UnreachableError, match=r"h must be in \[0, 0.1\] m, got") as error:
         CROUCH.inverse([0.05, h])
     assert error.value.index == (1,)
+
+
+@pytest.mark.parametrize("size", [1e-3, 1.0, 1e3])
+def test_crouch_is_as_exact_at_its_limits_whatever_its_size(size: float) -> None:
+    leg = CrouchingLeg(0.5 * size)
+    for part in (0.0, 1.0):
+        sign = 1.0 if part else -1.0
+        inside = leg.inverse(size * (part + sign * 8.0 * EPS))
+        np.testing.assert_array_equal(inside, leg.inverse(size * part))
+        with pytest.raises(UnreachableError, match="h must be in"):
+            leg.inverse(size * (part + sign * 32.0 * EPS))
 
 
 @pytest.mark.parametrize("bad", [0.0, -0.1, math.nan, math.inf, "0.1", True])
@@ -290,6 +302,7 @@ def test_wrong_arguments_are_refused() -> None:
         (lambda: CROUCH.jacobian(math.nan), "q1 must be in .* got nan rad"),
         (lambda: CROUCH.rates(0.1, math.inf), "h_dot must be finite"),
         (lambda: CROUCH.static_torques(q, two), "q1 and load must broadcast"),
+        (lambda: CROUCH.static_torques(0.1, [1.0, math.inf]), r"^load must be finite at index"),
         (lambda: CROUCH.inverse("high"), "h must be numbers"),
     ):
         with pytest.raises((ArgumentError, GeometryError), match=message):
