@@ -93,7 +93,9 @@ def copy(room: Room, folder: Path) -> None:
             dirs_exist_ok=True,
         )
 
-    options = ["-p", "no:cacheprovider", "-m", "not long", *(f"--deselect={test}" for test in SLOW)]
+    slow = [f"--deselect={test}" for test in SLOW]
+    # mutmut runs pytest in its own process, which finds the plugin next to mutate_operators.py.
+    options = ["-p", "no:cacheprovider", "-p", "mutate_cold", "-m", "not long", *slow]
     config = CONFIG.format(
         files=json.dumps(room.files),
         copied=json.dumps([name for name in COPIED if name != "fivebar_sim"]),
