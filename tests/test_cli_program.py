@@ -11,6 +11,8 @@ import pytest
 from shell import JUDGED
 
 from fivebar_sim import __version__
+from fivebar_sim.cli import program as fivebar
+from fivebar_sim.render import gl
 
 DIVERGING = ["--set", "sim.integrator=implicitfast", "--set", "sim.timestep=0.02"]
 FIVEBAR = str(Path(sys.executable).with_name("fivebar"))
@@ -73,3 +75,31 @@ for args in (["--version"], ["--help"], ["run", "--help"]):
 """
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert [line for line in done.stdout.splitlines() if "slow:" in line] == 3 * ["slow: []"]
+
+
+PROBE = [sys.executable, "-c", "import ctypes"]
+
+
+def test_code_in_the_users_folder_is_not_run_by_children(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Libraries start Python too, as glfw does; those children we cannot give a -P."""
+    (folder / "ctypes.py").write_text("raise SystemExit(3)", encoding="utf-8")
+
+    def call(args: list[str]) -> int:
+        return subprocess.run(PROBE).returncode
+
+    monkeypatch.delenv(fivebar.SAFE, raising=False)
+    monkeypatch.setattr(fivebar, "_call", call)
+    assert subprocess.run(PROBE).returncode == 3
+    assert fivebar.main([]) == 0
+    assert subprocess.run(PROBE).returncode == 3  # the caller's environment is as it was
+
+
+def test_trial_of_gl_imports_nothing_from_the_users_folder(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (folder / "mine.py").touch()
+    monkeypatch.delenv(fivebar.SAFE, raising=False)
+    monkeypatch.setattr(gl, "TRIAL", "import mine")
+    assert not gl.works.__wrapped__("egl")

@@ -10,7 +10,8 @@ import importlib
 import io
 import os
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from importlib.metadata import version
 from typing import Any
 
@@ -23,6 +24,9 @@ COMMANDS = ("run", "check", "converge", "replay", "report", "render", "view", "w
 
 HELP = {"-h", "--help"}
 
+SAFE = "PYTHONSAFEPATH"
+"""The variable with which Python imports nothing from the folder that it is started in."""
+
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command line; return its exit status."""
@@ -30,8 +34,25 @@ def main(argv: Sequence[str] | None = None) -> int:
     # A name may have letters that the terminal's encoding lacks: they must not end the program.
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(errors="backslashreplace")
-    with plain.output():
+    with plain.output(), _safe_children():
         return _main(args)
+
+
+@contextmanager
+def _safe_children() -> Iterator[None]:
+    """Have no Python that is started within import from the user's folder.
+
+    Libraries start some: glfw one that imports ctypes, and a ctypes.py there would be run.
+    """
+    before = os.environ.get(SAFE)
+    os.environ[SAFE] = "1"
+    try:
+        yield
+    finally:
+        if before is None:
+            del os.environ[SAFE]
+        else:
+            os.environ[SAFE] = before
 
 
 def _main(args: list[str]) -> int:

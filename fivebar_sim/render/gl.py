@@ -34,7 +34,8 @@ def works(way: str) -> bool:
     It is tried in a separate process: a failed attempt cannot be undone within a process, and a
     driver may crash.
     """
-    trial = [sys.executable, "-c", TRIAL.format(way=way)]
+    # -P: a mujoco.py in the user's folder must not be imported for MuJoCo.
+    trial = [sys.executable, "-P", "-c", TRIAL.format(way=way)]
     try:
         return subprocess.run(trial, capture_output=True, timeout=60).returncode == 0
     # A driver that hangs is as useless as one that fails.
