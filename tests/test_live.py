@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import itertools
+import re
 import socket
 import subprocess
 import threading
 import time
+from collections.abc import Iterator
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -20,6 +22,7 @@ from fivebar_sim import rollout
 from fivebar_sim.errors import ConfigError
 from fivebar_sim.recording import live
 from fivebar_sim.recording import viewer as recording_viewer
+from fivebar_sim.runs import directory
 from fivebar_sim.scenario import Scenario
 from fivebar_sim.simulation import steps
 
@@ -36,7 +39,7 @@ def kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     file = tmp_path / "live.rrd"
 
     def keep(self: rr.RecordingStream, url: str) -> None:
-        assert url == "rerun+http://127.0.0.1:9876/proxy"
+        assert re.fullmatch(r"rerun\+http://127\.0\.0\.1:\d+/proxy", url)
         self.save(file)
 
     monkeypatch.setattr(rr.RecordingStream, "connect_grpc", keep)
@@ -174,3 +177,62 @@ def test_viewer_that_is_closed_does_not_harm_the_run(tmp_path: Path) -> None:
         viewer.kill()
         viewer.wait()
     assert result.write(tmp_path / "run").is_dir()
+
+
+@pytest.fixture
+def stalled(monkeypatch: pytest.MonkeyPatch) -> Iterator[str]:
+    """Give the address of a viewer that greets and then takes nothing."""
+    monkeypatch.setattr(live, "STALLED", 0.2)
+    kept: list[socket.socket] = []
+
+    with socket.create_server(("127.0.0.1", 0)) as server:
+
+        def serve() -> None:
+            while True:
+                try:
+                    kept.append(server.accept()[0])
+                except OSError:
+                    return
+                kept[-1].sendall(live.SETTINGS)
+
+        thread = threading.Thread(target=serve)
+        thread.start()
+        yield f"127.0.0.1:{server.getsockname()[1]}"
+        server.shutdown(socket.SHUT_RDWR)
+        thread.join()
+    for each in kept:
+        each.close()
+
+
+def test_stalled_viewer_does_not_keep_the_run(shell: Shell, stalled: str) -> None:
+    assert shell("run", "short.toml", "--live-at", stalled, "--out", "mine").status == 0
+    directory.check_run(shell.folder / "mine")
+
+
+def test_signal_ends_a_run_whose_viewer_has_stalled(
+    stalled: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def wait(sender: object, relay: object) -> None:
+        raise AssertionError("it waits for the viewer")
+
+    monkeypatch.setattr(live._Sender, "finish", wait)
+    plan = rollout.plan(Scenario.load("classic-ellipse", ["duration=0.9"]))
+    with pytest.raises(KeyboardInterrupt):
+        run_interrupted(plan, stalled)
+
+
+def run_interrupted(plan: rollout.Plan, address: str) -> None:
+    with live.streaming(plan, address) as watch:
+        rollout.execute(plan, watch)
+        raise KeyboardInterrupt
+
+
+def test_interrupt_while_the_viewer_is_awaited_leaves_the_run(
+    shell: Shell, stalled: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def interrupted(sender: object, relay: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(live._Sender, "finish", interrupted)
+    assert shell("run", "short.toml", "--live-at", stalled, "--out", "mine").status == 130
+    directory.check_run(shell.folder / "mine")

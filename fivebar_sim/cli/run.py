@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -13,6 +14,7 @@ from fivebar_sim.errors import ConfigError, DivergedError
 
 if TYPE_CHECKING:
     from fivebar_sim.rollout import Plan, Result
+    from fivebar_sim.simulation.steps import Watch
 
 
 def run(
@@ -64,16 +66,24 @@ def _viewer(address: str | None) -> str:
     return live.spawn_viewer()
 
 
-def _execute(planned: Plan, viewer: str | None) -> Result:
-    """Simulate one plan, streaming it to a viewer if there is one."""
+def _execute(planned: Plan, viewer: str | None, place: Path) -> Result:
+    """Simulate and write one plan, streaming it to a viewer if there is one."""
     from fivebar_sim import rollout
 
+    with _watcher(planned, viewer) as watch:
+        result = rollout.execute(planned, watch)
+        # Before the viewer has everything: one that has stalled must not cost the result.
+        _write(result, place)
+    return result
+
+
+def _watcher(planned: Plan, viewer: str | None) -> AbstractContextManager[Watch | None]:
+    """Return a context that shows the states of a run in a viewer, if there is one."""
     if viewer is None:
-        return rollout.execute(planned)
+        return nullcontext()
     from fivebar_sim.recording import live
 
-    with live.streaming(planned, viewer) as watch:
-        return rollout.execute(planned, watch)
+    return live.streaming(planned, viewer)
 
 
 def _run(
@@ -91,8 +101,7 @@ def _run(
         name = planned.scenario.name
         try:
             with spinner(f"simulating {name}", quiet=quiet):
-                result = _execute(planned, viewer)
-                _write(result, place)
+                result = _execute(planned, viewer, place)
         # The other scenarios still run.
         except DivergedError as error:
             say(error)

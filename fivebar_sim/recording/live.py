@@ -22,6 +22,7 @@ from fivebar_sim.recording import viewer as recording_viewer
 from fivebar_sim.recording.look import Look
 from fivebar_sim.recording.plots import Series, series
 from fivebar_sim.recording.poses import DrawnMotion, Room, drawn_motion, room_of
+from fivebar_sim.recording.relay import Relay
 from fivebar_sim.recording.summary import colours
 from fivebar_sim.scenario.scenes import Ground
 from fivebar_sim.simulation.plan import Plan
@@ -43,7 +44,11 @@ HELLO = b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n" + SETTINGS
 ANSWER = 2.0
 """How long a viewer may take to answer HELLO [s]."""
 PATIENCE = 20.0
-"""How long a new viewer may take to listen, and how long sending the last rows may take [s]."""
+"""How long a new viewer may take to listen [s]."""
+STALLED = 5.0
+"""How long a viewer may take nothing of what is left to send before it is given up [s]."""
+FOREVER = 1e6
+"""Longer than any viewer takes [s]: it is `finish` that gives up."""
 
 
 @contextmanager
@@ -57,19 +62,25 @@ def streaming(planned: Plan, address: str) -> Iterator[Watch]:
     Raises:
         RerunDisabledError: The environment variable RERUN switches Rerun off.
     """
-    with rrd.session():
+    # The relay is left first: Rerun's own clean-up would wait for a viewer that does not read.
+    with rrd.session(), Relay(address) as relay:
         stream = rrd.started(planned.scenario.name)
-        stream.connect_grpc(f"rerun+http://{address}/proxy")
+        stream.connect_grpc(f"rerun+http://{relay.address}/proxy")
         sender = _Sender(planned, stream)
         # Python's own interval is ten times as long: so long the sender would hold up the physics.
         before = sys.getswitchinterval()
         sys.setswitchinterval(SWITCH)
         try:
             yield sender.put
+        except Exception:
+            # What led to the error is worth seeing; a signal, which is no Exception, ends at once.
+            sender.finish(relay)
+            raise
+        else:
+            sender.finish(relay)
         finally:
             sys.setswitchinterval(before)
-            sender.finish()
-            _end(stream)
+            sender.give_up(relay)
 
 
 def check_address(address: str) -> str:
@@ -95,21 +106,6 @@ def check_address(address: str) -> str:
         reason = error.strerror or error
         raise ConfigError(f"no Rerun viewer listens at {address}: {reason}") from None
     return address
-
-
-def _end(stream: rr.RecordingStream) -> None:
-    """Send what is left and disconnect, within `PATIENCE`: a viewer that is gone never answers."""
-
-    def end() -> None:
-        # A viewer that the user has closed does no harm to the run.
-        with suppress(RuntimeError):
-            stream.flush(timeout_sec=PATIENCE)
-            stream.disconnect()
-
-    # A daemon: if the call hangs all the same, it does not keep the program alive.
-    ending = threading.Thread(target=end, daemon=True)
-    ending.start()
-    ending.join(PATIENCE)
 
 
 def spawn_viewer() -> str:
@@ -154,6 +150,7 @@ class _Sender:
         self._last = None
         self._queue: queue.SimpleQueue[States | None] = queue.SimpleQueue()
         self._error: Exception | None = None
+        self._gone = False
         self._thread = threading.Thread(target=self._work, daemon=True)
         self._thread.start()
 
@@ -161,21 +158,44 @@ class _Sender:
         """Queue states for sending."""
         self._queue.put(states)
 
-    def finish(self) -> None:
-        """Wait until everything is sent; raise the error of the sending thread, if any."""
+    def finish(self, relay: Relay) -> None:
+        """Wait until everything is sent, or the viewer has stalled.
+
+        Raises:
+            Exception: The error of the sending thread, if any.
+        """
         self._queue.put(None)
-        self._thread.join()
+        begun = time.monotonic()
+        # Waits in pieces, between which a signal is heard.
+        while self._thread.is_alive():
+            self._thread.join(0.05)
+            if time.monotonic() - max(begun, relay.moved) > STALLED:
+                break
+
         if self._error is not None:
             raise self._error
 
+    def give_up(self, relay: Relay) -> None:
+        """End the connection and the sending thread, whether everything was sent or not."""
+        self._gone = True
+        relay.cut()
+        self._queue.put(None)
+        # Nothing to wait for is left; but a thread that is stuck must not keep the program.
+        self._thread.join(STALLED)
+
     def _work(self) -> None:
         while (states := self._queue.get()) is not None:
-            if self._error is None:
+            if self._error is None and not self._gone:
                 try:
                     self._send(states)
                 except Exception as error:
                     # Kept for `finish`: raised here, nobody would see it.
                     self._error = error
+
+        # A viewer that the user has closed does no harm to the run.
+        with suppress(RuntimeError):
+            self._stream.flush(timeout_sec=FOREVER)
+            self._stream.disconnect()
 
     def _send(self, states: States) -> None:
         """Send some steps."""

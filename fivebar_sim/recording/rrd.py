@@ -42,7 +42,9 @@ if TYPE_CHECKING:
     from fivebar_sim.scenario import Scenario
 
 APPLICATION = "fivebar"
-LOCK = threading.Lock()
+LOCK = threading.RLock()
+"""Held by a session; its thread may open another within, as when it writes a run that it shows."""
+_sessions = 0
 
 
 class RerunDisabledError(FiveBarError, RuntimeError):
@@ -98,8 +100,10 @@ def session() -> Iterator[None]:
     import rerun as rr
     import rerun_bindings
 
-    # Rerun's strictness is global, so one recording is made at a time.
+    global _sessions
+    # Rerun's strictness is global, so one thread at a time makes recordings.
     with LOCK:
+        _sessions += 1
         before = rr.strict_mode()
         rr.set_strict_mode(True)
         try:
@@ -107,9 +111,12 @@ def session() -> Iterator[None]:
         finally:
             rr.set_strict_mode(before)
             # A recording that nothing refers to keeps its threads and megabytes until this call,
-            # which fails for a live one whose viewer is gone.
-            with suppress(RuntimeError):
-                rerun_bindings.flush_and_cleanup_orphaned_recordings()
+            # which fails for a live one whose viewer is gone. Within another session it would wait
+            # for that one's viewer.
+            _sessions -= 1
+            if not _sessions:
+                with suppress(RuntimeError):
+                    rerun_bindings.flush_and_cleanup_orphaned_recordings()
 
 
 def _load() -> None:
