@@ -17,6 +17,8 @@ from numpy.typing import NDArray
 
 from fivebar_sim.arrays import Array, Bools
 from fivebar_sim.checks import check_number, check_step
+from fivebar_sim.control import winding
+from fivebar_sim.dynamics.heat import Winding
 from fivebar_sim.errors import ArgumentError
 from fivebar_sim.files import presets, tables
 from fivebar_sim.integrator import Integrator
@@ -48,6 +50,14 @@ class Servo(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
         rate: Commands per second on the bus [Hz]; None for one every timestep.
         delay: Time from sending a command to its effect [s].
         resolution: Step of the angles that can be commanded [rad], counted from 0; 0 for exact.
+        kt: Torque per current at the output, gear included [N m/A]; None where it is not known, and
+            then no run measures heat.
+        resistance: Of the winding [ohm]; goes with kt.
+        thermal_resistance: From the winding to the air [K/W]; None where it is not known, and then
+            no run measures temperature. It needs kt.
+        thermal_time: Time constant of the winding's temperature [s]; goes with it.
+        temperature_max: What the winding bears for good [deg C]; goes with it.
+        ambient: Temperature of the air [deg C].
     """
 
     kp: float = 8.0
@@ -58,6 +68,12 @@ class Servo(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
     rate: float | None = None
     delay: float = 0.0
     resolution: float = 0.0
+    kt: float | None = None
+    resistance: float | None = None
+    thermal_resistance: float | None = None
+    thermal_time: float | None = None
+    temperature_max: float | None = None
+    ambient: float = 25.0
 
     def __post_init__(self) -> None:
         check_number("kp", self.kp, "N m/rad", low=0.0, strict=True)
@@ -78,6 +94,7 @@ class Servo(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
 
         check_number("delay", self.delay, "s", low=0.0)
         check_step("resolution", self.resolution)
+        winding.check(self)
 
     @classmethod
     def load(cls, source: str | Path) -> Servo:
@@ -92,6 +109,11 @@ class Servo(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
     def back_emf(self) -> float:
         """Torque lost per rate of the motor, limit / speed [N m s/rad]."""
         return _back_emf(self)
+
+    @property
+    def winding(self) -> Winding | None:
+        """The motor's winding; None where the table does not describe it."""
+        return winding.winding(self)
 
     @property
     def damping(self) -> float:
