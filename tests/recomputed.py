@@ -43,6 +43,7 @@ def recomputed(run: Run) -> Found:
         **_errors(run),
         **_peaks(run),
         **_load(run),
+        **_heat(run),
         **_ground(run),
         **_branch(run),
         **recomputed_energy.energies(run),
@@ -169,6 +170,42 @@ def _clips(run: Run) -> Bools:
     if "speed" in servo:
         asked = asked - servo["kd"] * rate
     return np.abs(asked) > servo["limit"]
+
+
+def _heat(run: Run) -> Found:
+    """Return the heat of the windings, as far as the servo's table tells of them."""
+    servo = run.scenario["servo"]
+    found: Found = {}
+    if "speed" in servo:
+        lost = servo["limit"] / servo["speed"]
+        for m in "AE":
+            both = run.record[f"torque_{m}"] + lost * run.record[f"theta_dot_{m}"]
+            found[f"load.line.{m}"] = np.sort(np.abs(both[run.rows]))[-1] / servo["limit"]
+    if "kt" not in servo:
+        return found
+
+    parts = []
+    for m in "AE":
+        current = run.record[f"torque_{m}"][_lasting(run)] / servo["kt"]
+        watts = servo["resistance"] * (current @ current) / len(current)
+        found[f"load.heat.{m}"] = watts
+        if "thermal_resistance" in servo:
+            warmer = watts * servo["thermal_resistance"]
+            parts.append(warmer / (servo["temperature_max"] - servo["ambient"]))
+            found[f"load.temperature.{m}"] = servo["ambient"] + warmer
+            found[f"load.continuous.{m}"] = math.sqrt(parts[-1])
+    if parts:
+        found["load.survives"] = max(parts)
+    return found
+
+
+def _lasting(run: Run) -> slice:
+    """Return the steps at rest after a single step of the foot, or those of the window."""
+    path = run.scenario["path"]
+    if path["kind"] != "step":
+        return run.rows
+    first = round((path["seconds"] + 0.5 * path["ramp"]) / run.h)
+    return slice(first, None) if first < len(run.record["time"]) else run.rows
 
 
 def _cycle(run: Run) -> tuple[Array | None, Bools | None]:

@@ -8,13 +8,29 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
+from fivebar_sim import rollout
 from fivebar_sim.control.servo import Servo
 from fivebar_sim.dynamics import heat
 from fivebar_sim.dynamics.heat import Cooling, Winding
-from fivebar_sim.errors import ArgumentError
+from fivebar_sim.errors import ArgumentError, ConfigError
+from fivebar_sim.rollout import Result
+from fivebar_sim.scenario import Scenario
 
 COOLING = Cooling(resistance=34.0, time=92.0, hottest=70.0, ambient=20.0)
 WINDING = Winding(kt=0.15, R=3.4, cooling=COOLING)
+
+AT_REST = (
+    *("limits={}", "controller.feedforward=torque", "duration=0.4"),
+    "path={kind='step',start=[0,-0.055],stop=[0,-0.055],lift=0,seconds=0.1}",
+)
+"""The q8bot's leg lifts its foot from nowhere to nowhere, and holds it."""
+
+
+def holding(mass: float, *settings: str) -> Result:
+    """Return the run of a leg that stands still with a mass on its foot [kg]."""
+    load = f"scene={{kind='payload',mass={mass}}}"
+    return rollout.run(Scenario.load("q8bot-xl330", [*AT_REST, load, *settings]))
+
 
 # law
 
@@ -84,10 +100,77 @@ def test_the_heat_of_the_hotter_motor_counts() -> None:
     assert found.used == other.used == found.watts[1] / COOLING.allowed
 
 
+def test_a_clipped_motor_is_on_its_line_and_never_beyond() -> None:
+    result = rollout.run(Scenario.load("q8bot-xl330", ["limits={}", "path.frequency=5"]))
+    load = result.metrics["load"]
+    assert load["saturated"]["A"] > 0.0
+    for motor in "AE":
+        assert load["line"][motor] <= 1.0 + 1e-12
+    assert max(load["line"].values()) == pytest.approx(1.0, rel=1e-12)
+
+
 def test_without_load_a_motor_at_its_speed_is_on_the_line() -> None:
     speed = np.array([[40.0, -20.0], [0.0, 10.0]])
     torque = np.array([[0.0, -0.1], [0.2, 0.0]])
     assert heat.line_used(torque, speed, 0.4, 40.0) == pytest.approx([1.0, 0.75])
+
+
+# runs
+
+
+def test_a_leg_at_rest_at_89_percent_of_its_stall_does_not_survive() -> None:
+    result = holding(1.425)
+    servo = result.scenario.servo
+    load = result.metrics["load"]
+    assert servo.limit is not None
+    assert load["torque_rms"]["A"] == pytest.approx(0.89 * servo.limit, rel=0.01)
+    assert result.verdict == "fail"
+
+    guard = next(each for each in result.measured.guards if not each.ok)
+    assert guard.name == "heat"
+    assert guard.value == load["survives"]
+    assert guard.time == pytest.approx(23.3, abs=1.0)
+    said = "guard heat: for good, this would give a winding more than 100 % of the heat that it"
+    assert str(guard).startswith(said)
+
+
+def test_a_leg_that_rests_at_half_of_that_survives() -> None:
+    result = holding(0.5)
+    load = result.metrics["load"]
+    assert result.verdict == "not judged"
+    assert load["survives"] == pytest.approx(max(load["continuous"].values()) ** 2, rel=1e-12)
+    assert load["temperature"]["A"] == pytest.approx(25.0 + 34.0 * load["heat"]["A"], rel=1e-12)
+
+
+def test_what_lasts_is_the_rest_not_the_step_before_it() -> None:
+    scenario = Scenario.load("q8bot-xl330", [*AT_REST, "path.lift=0.01"])
+    assert scenario.for_good == slice(100, 400)
+    periodic = Scenario.load("q8bot-xl330")
+    assert periodic.for_good == periodic.window
+
+
+def test_a_hot_day_is_no_day_for_a_servo_that_just_survives() -> None:
+    assert holding(0.5, "servo.ambient=60").verdict == "fail"
+    assert holding(0.5, "servo.ambient=60", "guards.heat=3").verdict == "not judged"
+
+
+# edge
+
+
+def test_a_servo_that_nobody_described_has_no_heat() -> None:
+    load = rollout.run(Scenario.load("classic-ellipse", ["duration=0.8"])).metrics["load"]
+    assert not {"heat", "temperature", "continuous", "survives", "line"} & load.keys()
+
+
+def test_a_servo_without_a_cooling_has_watts_alone() -> None:
+    settings = ["duration=0.8", "servo.kt=0.5", "servo.resistance=2.0"]
+    result = rollout.run(Scenario.load("classic-ellipse", settings))
+    load = result.metrics["load"]
+    torque = result.record["torque_E"][result.scenario.window]
+    assert load["heat"]["E"] == pytest.approx(8.0 * np.mean(torque**2), rel=1e-12)
+    assert not {"temperature", "continuous", "survives"} & load.keys()
+    assert "heat" not in [guard.name for guard in result.measured.guards]
+    assert Winding(0.5, 2.0).continuous is None
 
 
 # refusal
@@ -121,3 +204,19 @@ def test_without_load_a_motor_at_its_speed_is_on_the_line() -> None:
 def test_an_incomplete_winding_is_refused(keys: dict[str, float], message: str) -> None:
     with pytest.raises(ArgumentError, match=message):
         Servo(**keys)
+
+
+@pytest.mark.parametrize(
+    ("key", "needs"),
+    [
+        ("heat.A", "servo.kt and servo.resistance"),
+        ("temperature.E", "servo.thermal_resistance and what goes with it"),
+        ("continuous.A", "servo.thermal_resistance and what goes with it"),
+        ("survives", "servo.thermal_resistance and what goes with it"),
+        ("line.E", "servo.speed"),
+    ],
+)
+def test_a_limit_on_what_this_servo_does_not_tell_is_refused(key: str, needs: str) -> None:
+    with pytest.raises(ConfigError, match=rf"limits\.load\.{key} needs {needs}: this servo has"):
+        Scenario.load("classic-ellipse", [f"limits.load.{key}=1"])
+    assert Scenario.load("q8bot-xl330", [f"limits.load.{key}=100"]).limits

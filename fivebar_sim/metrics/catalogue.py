@@ -157,6 +157,15 @@ CATALOGUE = (
     *_peaks("torque_peak", "torque {} peak", 1e3, "mN m", 1e-6, "load.torque_peak"),
     *_peaks("speed_peak", "speed {} peak", 1.0, "rad/s", None),
     *_peaks("power_peak", "power {} peak", 1.0, "W", 1e-5),
+    Metric("load.heat.A", "heat A", 1.0, "W"),
+    Metric("load.heat.E", "heat E", 1.0, "W"),
+    Metric("load.temperature.A", "winding A for good", 1.0, "deg C"),
+    Metric("load.temperature.E", "winding E for good", 1.0, "deg C"),
+    Metric("load.continuous.A", "continuous torque A", 1e2, "%", detail=True),
+    Metric("load.continuous.E", "continuous torque E", 1e2, "%", detail=True),
+    Metric("load.survives", "survives up to 100 %", 1e2, "%"),
+    Metric("load.line.A", "torque-speed line A", 1e2, "%"),
+    Metric("load.line.E", "torque-speed line E", 1e2, "%"),
     # 2e-3 of a share of steps: three steps of 1500.
     Metric("load.share_A", "load share A", 1e2, "%", tolerance=2e-3),
     Metric("load.thermal_share_A", "thermal share A", 1e2, "%", tolerance=2e-3),
@@ -237,6 +246,18 @@ GROUND_KEYS = tuple(
     key for key in LIMIT_KEYS if key.startswith(("ground.", "ground_peak.", "whole.ground_peak."))
 )
 """The metrics of scenes with a ground."""
+
+HEAT_KEYS = ("load.heat.A", "load.heat.E")
+"""The metrics of servos whose tables describe the winding."""
+
+COOLING_KEYS = (
+    *("load.temperature.A", "load.temperature.E"),
+    *("load.continuous.A", "load.continuous.E", "load.survives"),
+)
+"""The metrics of servos whose tables say how the winding cools."""
+
+LINE_KEYS = ("load.line.A", "load.line.E")
+"""The metrics of servos with a torque-speed line."""
 
 BY_KEY = {metric.key: metric for metric in CATALOGUE}
 """Every metric by its key."""

@@ -66,3 +66,8 @@ BELT_COLUMN = "belt_x"
 def motors(record: Mapping[str, Array], name: str) -> Array:
     """Return a column of A and of E side by side, "torque" or "theta" as in torque_A, (N, 2)."""
     return np.stack([record[f"{name}_{motor}"] for motor in MOTORS], axis=-1)
+
+
+def by_motor(pair: Array) -> dict[str, float]:
+    """Return a value of A and one of E by the motor's name."""
+    return dict(zip(MOTORS, pair.tolist(), strict=True))

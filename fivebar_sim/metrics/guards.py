@@ -18,6 +18,7 @@ import numpy as np
 from fivebar_sim import units
 from fivebar_sim.arrays import Array, Bools
 from fivebar_sim.checks import check_number
+from fivebar_sim.dynamics.heat import Heating
 from fivebar_sim.errors import unknown
 from fivebar_sim.geometry import FiveBar
 from fivebar_sim.kinematics.stops import Ranges, beyond
@@ -52,6 +53,8 @@ class Guards(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
         rail: Largest force of the rail's end on the trunk [N].
         contact: Largest h kd / M of a leg that stands with friction under `implicitfast`; errors of
             torques and load share are up to 0.2 times as large. See `contact.shortfall`.
+        heat: Largest heat of a motor's winding if the motion goes on for good, as a part of what it
+            bears. See `heat.heating`.
     """
 
     loop: float = 0.01
@@ -65,13 +68,14 @@ class Guards(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     stops: float = 1e-5
     rail: float = 0.0
     contact: float = 0.5
+    heat: float = 1.0
 
     def __post_init__(self) -> None:
         check_number("loop", self.loop, "", low=0.0)
         check_number("ground", self.ground, "", low=0.0)
         check_number("torque", self.torque, "", low=0.0, high=1.0)
         check_number("chatter", self.chatter, "", low=0.0, high=1.0)
-        for part in ("energy", "constraints", "step", "floor", "stops", "contact"):
+        for part in ("energy", "constraints", "step", "floor", "stops", "contact", "heat"):
             check_number(part, getattr(self, part), "", low=0.0)
         check_number("rail", self.rail, "N", low=0.0)
 
@@ -83,7 +87,8 @@ class Guard(Table, frozen=True):
         name: Name of the guard.
         value: The worst value of the run, in SI units; None where it is undefined.
         high: Largest value that is fine.
-        time: When it tripped, the first step above `high` [s]; None if it never did.
+        time: When it tripped, the first step above `high` [s]; None if it never did. `heat` counts
+            from a cold start of the motion that goes on for good, also beyond the end of the run.
         ok: Whether it held.
         part: Which part of the leg tripped it, "joint B", where it watches several by name.
     """
@@ -130,6 +135,8 @@ class Evidence(NamedTuple):
         trunk: Height of the trunk's lowest point above the hip frame's origin [m].
         creeping: Damping of the servos that makes a foot creep [N m s/rad]; None under `discrete`,
             and on a floor without friction.
+        heating: Heat of the motors if the motion goes on for good; None where the servo's table
+            does not describe the winding.
     """
 
     bounds: Guards
@@ -143,6 +150,7 @@ class Evidence(NamedTuple):
     ranges: Ranges
     trunk: float
     creeping: float | None = None
+    heating: Heating | None = None
 
 
 class Found(NamedTuple):
@@ -234,6 +242,14 @@ def _leaned(run: Evidence) -> Found:
     q = np.stack([run.record[name] for name in JOINT_COLUMNS], axis=-1)
     found = beyond(q, run.ranges)
     return _first_of(run, {f"joint {joint}": found[joint] for joint in found}, run.bounds.stops)
+
+
+def _overheated(run: Evidence) -> Found | None:
+    if run.heating is None or run.heating.used is None:
+        return None
+    high = run.bounds.heat
+    used = run.heating.used
+    return Found(used, high, run.heating.reaches(high))
 
 
 def _in_floor(run: Evidence) -> Found | None:
@@ -368,6 +384,14 @@ GUARDS = (
         ", {} at worst: shorten it or use discrete",
         1.0,
         "",
+    ),
+    Row(
+        "heat",
+        _overheated,
+        "for good, this would give a winding more than {} of the heat that it bears",
+        ", {} at worst",
+        1e2,
+        "%",
     ),
     Row(
         "ground",

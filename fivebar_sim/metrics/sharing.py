@@ -84,11 +84,31 @@ class Sharing(Share, frozen=True):
     phase: Phase | msgspec.UnsetType = msgspec.UNSET
 
 
+class Temperatures(Table, frozen=True):
+    """A temperature of each motor [deg C]."""
+
+    A: Number
+    E: Number
+
+
 class Load(Sharing, frozen=True, kw_only=True):
     """The load over the measured window.
 
     Attributes:
+        heat: Mean copper heat of each motor [W]; see `heat.heating`. Unset where the servo's table
+            does not describe the winding.
+        temperature: What each winding gets to if this goes on for good [deg C]; unset where the
+            servo's table does not say how the winding cools.
+        continuous: RMS torque of each motor as a part of its continuous torque; unset as above.
+        survives: Heat of the hotter motor as a part of what it bears for good; unset as above.
+        line: How near each motor comes to its torque-speed line, on it is 1; unset for a servo
+            without one.
         saturated: Part of the steps in which the torque limit clipped each motor.
     """
 
+    heat: Motors | msgspec.UnsetType = msgspec.UNSET
+    temperature: Temperatures | msgspec.UnsetType = msgspec.UNSET
+    continuous: Motors | msgspec.UnsetType = msgspec.UNSET
+    survives: Amount | msgspec.UnsetType = msgspec.UNSET
+    line: Motors | msgspec.UnsetType = msgspec.UNSET
     saturated: Parts

@@ -21,7 +21,13 @@ from fivebar_sim.files import resources, tables
 from fivebar_sim.files.tables import Table
 from fivebar_sim.geometry import FiveBar
 from fivebar_sim.integrator import Sim
-from fivebar_sim.metrics.catalogue import GROUND_KEYS, LIMIT_KEYS
+from fivebar_sim.metrics.catalogue import (
+    COOLING_KEYS,
+    GROUND_KEYS,
+    HEAT_KEYS,
+    LIMIT_KEYS,
+    LINE_KEYS,
+)
 from fivebar_sim.metrics.guards import Guards
 from fivebar_sim.paths import FootPath, Gait
 from fivebar_sim.scenario import forces, reading
@@ -98,6 +104,15 @@ class Scenario(msgspec.Struct, frozen=True, kw_only=True):
             periods = math.floor((self.duration - ramp) / period * (1.0 + 1e-9))
             return slice(first, min(round((ramp + periods * period) / h), last))
         return slice(first, min(round(min(self.path.rest, self.duration) / h), last))
+
+    @property
+    def for_good(self) -> slice:
+        """The rows that stand for a motion that goes on for good: the motors' heat is theirs.
+
+        Those of the window, or the steps at rest after a path that comes to rest within the run.
+        """
+        first = round(min(self.path.rest, self.duration) / self.sim.timestep)
+        return slice(first, self.steps) if first < self.steps else self.window
 
     @property
     def command(self) -> int:
@@ -359,3 +374,19 @@ def _check_scene(scenario: Scenario, where: str) -> None:
                 f"{where}: limits.{key} needs a ground: scene must be rail or treadmill, "
                 f"got {scene.kind!r}"
             )
+
+    _check_servo_limits(scenario, where)
+
+
+def _check_servo_limits(scenario: Scenario, where: str) -> None:
+    """Raise if a limit is on a metric that needs more of the servo than its table says."""
+    servo = scenario.servo
+    needs = (
+        (HEAT_KEYS, servo.kt, "servo.kt and servo.resistance"),
+        (COOLING_KEYS, servo.thermal_resistance, "servo.thermal_resistance and what goes with it"),
+        (LINE_KEYS, servo.speed, "servo.speed"),
+    )
+    for keys, given, what in needs:
+        for key in scenario.limits:
+            if key in keys and given is None:
+                raise ConfigError(f"{where}: limits.{key} needs {what}: this servo has none")

@@ -3,19 +3,29 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import msgspec
 import numpy as np
 
 from fivebar_sim.arrays import Array, Bools
 from fivebar_sim.control import Feedback
+from fivebar_sim.dynamics import heat
 from fivebar_sim.kinematics.stops import Ranges
-from fivebar_sim.metrics import branch, catalogue, energy, ground, guards, load, measured, peaks
-from fivebar_sim.metrics.columns import MOTORS, motors
-from fivebar_sim.metrics.json_types import Parts
+from fivebar_sim.metrics import (
+    branch,
+    catalogue,
+    energy,
+    ground,
+    guards,
+    load,
+    measured,
+    peaks,
+)
+from fivebar_sim.metrics.columns import by_motor, motors
+from fivebar_sim.metrics.json_types import Motors, Parts
 from fivebar_sim.metrics.measured import Measured
-from fivebar_sim.metrics.sharing import Load
+from fivebar_sim.metrics.sharing import Load, Temperatures
 from fivebar_sim.paths import Gait
 from fivebar_sim.scenario.scenes import Ground
 
@@ -60,25 +70,24 @@ def measure(scenario: Scenario, record: Mapping[str, Array], besides: Unrecorded
         besides: What the record leaves out.
     """
     leg = scenario.leg
-    # qpos may begin with the hip's height; its last four are A, B, E, D.
-    start = besides.steps.start[-4::2]
-    saturated = besides.saturated
 
     body = energy.Body(leg, scenario.payload, scenario.trunk)
     balance = energy.balance(body, record, besides.steps)
     folded = branch.measure(leg, record)
+    heated = _heating(scenario, record)
     checked = guards.Evidence(
         bounds=scenario.guards,
         leg=leg,
         record=record,
         branch=folded,
-        saturated=saturated,
+        saturated=besides.saturated,
         balance=balance,
         unsolved=besides.unsolved,
         command=scenario.command,
         ranges=besides.ranges,
         trunk=besides.trunk,
         creeping=_creeping(scenario),
+        heating=heated,
     )
 
     window = scenario.window
@@ -87,7 +96,7 @@ def measure(scenario: Scenario, record: Mapping[str, Array], besides: Unrecorded
     return measured.of(
         catalogue.measure(leg, record, window),
         window=peaks.Window(begin=window.start * h, end=window.stop * h),
-        load=_load(scenario, record, start, saturated),
+        load=_load(scenario, record, besides, heated),
         peaks=peaks.measure(record, window),
         whole=peaks.measure_whole(record),
         energy=energy.measure(balance),
@@ -110,8 +119,47 @@ def _creeping(scenario: Scenario) -> float | None:
     return scenario.servo.damping if drive == "position" else scenario.servo.back_emf
 
 
-def _load(scenario: Scenario, record: Mapping[str, Array], start: Array, saturated: Bools) -> Load:
-    """Return how the motors share the load over the window, and how often they were clipped."""
+def _heating(scenario: Scenario, record: Mapping[str, Array]) -> heat.Heating | None:
+    """Return the heat of the motors; None where the servo's table does not describe the winding."""
+    winding = scenario.servo.winding
+    if winding is None:
+        return None
+    return heat.heating(motors(record, "torque")[scenario.for_good], winding)
+
+
+def _warmth(heated: heat.Heating | None) -> dict[str, Any]:
+    """Return what the table `load` says of the heat, as far as it is known."""
+    if heated is None:
+        return {}
+    warmth: dict[str, Any] = {"heat": Motors(**by_motor(heated.watts))}
+    if heated.temperature is None or heated.continuous is None:
+        return warmth
+    return warmth | {
+        "temperature": Temperatures(**by_motor(heated.temperature)),
+        "continuous": Motors(**by_motor(heated.continuous)),
+        "survives": heated.used,
+    }
+
+
+def _line(scenario: Scenario, record: Mapping[str, Array]) -> dict[str, Any]:
+    """Return how near the motors come to the servo's torque-speed line, where it has one."""
+    limit = scenario.servo.limit
+    no_load = scenario.servo.speed
+    if limit is None or no_load is None:
+        return {}
+    torque, speed = (motors(record, name)[scenario.window] for name in ("torque", "theta_dot"))
+    return {"line": Motors(**by_motor(heat.line_used(torque, speed, limit, no_load)))}
+
+
+def _load(
+    scenario: Scenario,
+    record: Mapping[str, Array],
+    besides: Unrecorded,
+    heated: heat.Heating | None,
+) -> Load:
+    """Return how the motors share the load over the window, how hot they get, and more."""
+    # qpos may begin with the hip's height; its last four are A, B, E, D.
+    start = besides.steps.start[-4::2]
     window = scenario.window
     path = scenario.path
     h = scenario.sim.timestep
@@ -134,7 +182,6 @@ def _load(scenario: Scenario, record: Mapping[str, Array], start: Array, saturat
         stance = phase < path.duty
 
     shared = load.sharing(torque[window], turned, h, stance=stance, phase=phase)
-    clipped = saturated[window].mean(axis=0).tolist()
-    return Load(
-        **msgspec.structs.asdict(shared), saturated=Parts(**dict(zip(MOTORS, clipped, strict=True)))
-    )
+    clipped = Parts(**by_motor(besides.saturated[window].mean(axis=0)))
+    more = _warmth(heated) | _line(scenario, record)
+    return Load(**msgspec.structs.asdict(shared), **more, saturated=clipped)
