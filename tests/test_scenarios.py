@@ -169,9 +169,8 @@ def test_guards_stay_far_below_their_bounds() -> None:
         for guard in result.metrics["guards"]:
             if guard["name"] in most:
                 bound = getattr(result.scenario.guards, guard["name"])
-                # The rail may not carry at all: its value is what it is.
-                scale = bound / guard["high"] if guard["high"] else 1.0
-                part = scale * guard["value"]
+                # high is the bound times a scale of the run, but where the bound is 0: not at all
+                part = bound * guard["value"] / guard["high"] if bound else guard["value"]
                 most[guard["name"]] = max(most[guard["name"]], part)
     page = (Path(__file__).parents[1] / "docs" / "model.md").read_text("utf-8")
     for name, part in most.items():
