@@ -165,11 +165,11 @@ def squats(timesteps: tuple[float, ...]) -> None:
         rows,
     )
     rows = []
-    for noslip in (0, 3):
-        g = stance.grip(Key("classic", "discrete", "velocity", 1e-3), noslip)
+    for impratio in (100, 1000, 10000):
+        g = stance.grip(Key("classic", "discrete", "velocity", 1e-3), impratio)
         off = 100 * g.side_off / g.side
         cells = [percent(g.error.rms), percent(g.error.late), f"{g.side:.2f}", f"{off:.1f}"]
-        rows.append([f"classic, noslip_iterations = {noslip}", *cells, f"{1e6 * g.creep:.0f}"])
+        rows.append([f"classic, impratio = {impratio}", *cells, f"{1e6 * g.creep:.0f}"])
 
     show(
         "d. squat with friction 1, discrete, 1 ms, against a ball that rolls without slip",
@@ -182,14 +182,17 @@ def with_friction() -> None:
     """Print the part of bar d that a contact with friction decides, and real servos."""
     runs = {
         "discrete, 1 ms": friction.mujoco("discrete", 1e-3, stance.DURATION),
-        "discrete, 1 ms, impratio 1000": friction.mujoco(
-            "discrete", 1e-3, stance.DURATION, impratio=1e3
+        "discrete, 1 ms, impratio 100": friction.mujoco(
+            "discrete", 1e-3, stance.DURATION, impratio=100.0
         ),
         "discrete, 1 ms, noslip_iterations 3": friction.mujoco(
             "discrete", 1e-3, stance.DURATION, noslip=3
         ),
         "implicitfast, 1 ms": friction.mujoco("implicitfast", 1e-3, stance.DURATION),
         "implicitfast, 0.1 ms": friction.mujoco("implicitfast", ON_GROUND, stance.DURATION),
+        "implicitfast, 0.1 ms, impratio 100": friction.mujoco(
+            "implicitfast", ON_GROUND, stance.DURATION, impratio=100.0
+        ),
         "implicitfast, 0.1 ms, noslip_iterations 3": friction.mujoco(
             "implicitfast", ON_GROUND, stance.DURATION, noslip=3
         ),

@@ -62,14 +62,14 @@ def test_without_friction_it_is_the_rigid_floor() -> None:
 
 
 @BOTH
-def test_share_is_that_of_dry_friction_where_nothing_creeps(integrator: Integrator) -> None:
-    """But leg.xml's contact creeps, which costs 5 % of the share in a single squat."""
+def test_share_and_torques_are_those_of_dry_friction(integrator: Integrator) -> None:
+    """At impratio 100 the foot creeps, which costs 4 % of the share in a single squat."""
     known = friction.coulomb(0.75, 2e5, 60.0)
-    noslip = friction.mujoco(integrator, STEPS[integrator], 0.75, noslip=3)
-    np.testing.assert_allclose(noslip, known, rtol=0.015)
-    plain = friction.mujoco(integrator, STEPS[integrator], 0.75)
-    assert 0.03 < 1.0 - plain.share / known.share < 0.06
-    assert 0.06 < plain.E / known.E - 1.0 < 0.10
+    found = friction.mujoco(integrator, STEPS[integrator], 0.75)
+    np.testing.assert_allclose(found, known, rtol=0.015)
+    creeps = friction.mujoco(integrator, STEPS[integrator], 0.75, impratio=100.0)
+    assert 0.03 < 1.0 - creeps.share / known.share < 0.06
+    assert 0.06 < creeps.E / known.E - 1.0 < 0.10
 
 
 @pytest.mark.long
@@ -79,9 +79,11 @@ def test_stiffer_models_agree_better() -> None:
     hard = friction.mujoco("discrete", 6.25e-5, 1.25, impratio=1e4, hard=True)
     np.testing.assert_allclose(hard, known, rtol=6e-3)
     for integrator, h in STEPS.items():
+        np.testing.assert_allclose(friction.mujoco(integrator, h, 1.25), known, rtol=0.03)
         noslip = friction.mujoco(integrator, h, 1.25, noslip=3)
         np.testing.assert_allclose(noslip, known, rtol=0.03)
-        assert 0.06 < 1.0 - friction.mujoco(integrator, h, 1.25).share / known.share < 0.09
+        creeps = friction.mujoco(integrator, h, 1.25, impratio=100.0)
+        assert 0.06 < 1.0 - creeps.share / known.share < 0.09
     assert friction.coulomb(1.25, 2e4, 20.0).share > 1.07 * known.share
     assert friction.coulomb(1.25, 1e6, 100.0).share == pytest.approx(known.share, rel=3e-3)
 
@@ -91,7 +93,7 @@ def test_stiffer_models_agree_better() -> None:
 
 def test_contact_and_step_with_one_inertia_do_not_creep() -> None:
     """H kd as armature, taken out of the step: what is solved stays, and the contact knows it."""
-    limit = 0.3557
+    limit = 0.487
     scenario = Scenario.load("treadmill-trot", CREEPS)
     found = rollout.run(scenario).metrics["load"]["share_A"]
     plan = rollout.plan(scenario)
@@ -100,8 +102,8 @@ def test_contact_and_step_with_one_inertia_do_not_creep() -> None:
     model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_EULERDAMP
     model.dof_armature[:] += scenario.sim.timestep * model.dof_damping
     alike = rollout.execute(plan).metrics["load"]["share_A"]
-    assert abs(alike / limit - 1.0) < 0.02
-    assert found < 0.55 * limit
+    assert abs(alike / limit - 1.0) < 0.04
+    assert abs(found / limit - 1.0) > 0.6
 
 
 # the guard

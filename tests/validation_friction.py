@@ -52,7 +52,7 @@ def mujoco(
     timestep: float,
     duration: float,
     *,
-    impratio: float = 100.0,
+    impratio: float | None = None,
     noslip: int = 0,
     hard: bool = False,
 ) -> Load:
@@ -62,12 +62,13 @@ def mujoco(
         integrator: MuJoCo's integrator.
         timestep: h [s].
         duration: Length of the squat [s].
-        impratio: How much harder friction is than the normal contact; leg.xml has 100.
+        impratio: How much harder friction is than the normal contact; None: as leg.xml has it.
         noslip: Iterations of the solver that takes all softness out of friction.
         hard: Whether the contact is that of `stance.harden`.
     """
     plan = stance.planned(Key("classic", integrator, "velocity", timestep), grips=True)
-    plan.model.opt.impratio = impratio
+    if impratio is not None:
+        plan.model.opt.impratio = impratio
     plan.model.opt.noslip_iterations = noslip
     record = air.sampled(rollout.execute(stance.harden(plan) if hard else plan), 0)
     tau = air.pair(record, "torque_A", "torque_E")

@@ -123,11 +123,11 @@ class Grip(NamedTuple):
     creep: float
 
 
-def grip(key: Key, noslip: int) -> Grip:
-    """Return how a stance with friction compares; noslip: iterations of MuJoCo's solver."""
+def grip(key: Key, impratio: float) -> Grip:
+    """Return how a stance with friction compares; impratio: how hard friction is in MuJoCo."""
     leg = FiveBar.load(key.preset)
     plan = planned(key, grips=True)
-    plan.model.opt.noslip_iterations = noslip
+    plan.model.opt.impratio = impratio
     result = rollout.execute(plan)
     record = air.sampled(result, FIRST)
     rolled = _rolled(leg, record["foot_x"], record["theta_A"] + record["theta_B"])
