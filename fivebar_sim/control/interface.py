@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import os
-import sys
 from collections.abc import Callable
-from functools import cache
-from importlib.metadata import EntryPoint, entry_points
+from importlib.metadata import EntryPoint
 from typing import Any, ClassVar, NamedTuple, Protocol, runtime_checkable
 
 import msgspec
@@ -16,6 +13,7 @@ from numpy.typing import NDArray
 from fivebar_sim.arrays import Array
 from fivebar_sim.control.servo import Drive, Servo
 from fivebar_sim.errors import ConfigError, FiveBarError, unknown
+from fivebar_sim.files.installed import installed, load
 from fivebar_sim.geometry import FiveBar
 from fivebar_sim.integrator import Integrator
 from fivebar_sim.motion import Motion
@@ -101,32 +99,7 @@ def known() -> dict[str, EntryPoint]:
     Raises:
         ConfigError: If two packages bring a controller of one name.
     """
-    return dict(_installed(tuple(_stamp(path) for path in sys.path)))
-
-
-def _stamp(path: str) -> tuple[str, int]:
-    """Return a folder of sys.path and when something in it was installed or removed last."""
-    try:
-        return path, os.stat(path or ".").st_mtime_ns
-    except OSError:
-        return path, 0
-
-
-# Reading the metadata of every installed package takes longer than many a run, so it is read again
-# only after one of the folders has changed.
-@cache
-def _installed(stamps: tuple[tuple[str, int], ...]) -> dict[str, EntryPoint]:
-    """Return what `known` does, for folders in one state."""
-    del stamps  # what the cache goes by
-    found: dict[str, EntryPoint] = {}
-    for entry in entry_points(group=GROUP):
-        if entry.name in found and found[entry.name].value != entry.value:
-            raise ConfigError(
-                f"two controllers are called {entry.name!r}: {found[entry.name].value} and "
-                f"{entry.value}; uninstall one"
-            )
-        found[entry.name] = entry
-    return found
+    return installed(GROUP, "controller")
 
 
 def find(name: str) -> type[Any]:
@@ -140,12 +113,7 @@ def find(name: str) -> type[Any]:
         raise ConfigError(unknown("controller", name, controllers))
 
     value = controllers[name].value
-    try:
-        kind = controllers[name].load()
-    except Exception as error:  # what an import runs may raise anything
-        raise ConfigError(
-            f"cannot load controller {name!r} from {value}: {type(error).__name__}: {error}"
-        ) from error
+    kind = load(controllers[name], "controller")
 
     struct = isinstance(kind, type) and issubclass(kind, msgspec.Struct)
     if not struct or not any(callable(getattr(kind, m, None)) for m in ("setpoints", "command")):

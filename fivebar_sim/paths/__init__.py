@@ -7,6 +7,8 @@ from __future__ import annotations
 
 from typing import get_args
 
+from fivebar_sim.errors import ConfigError
+from fivebar_sim.files.installed import installed, load
 from fivebar_sim.paths.base import FootPath, Sample
 from fivebar_sim.paths.csv import Csv
 from fivebar_sim.paths.gait import Gait
@@ -29,9 +31,36 @@ __all__ = [
     "PathSpec",
     "Sample",
     "Step",
+    "kinds",
 ]
+
+GROUP = "fivebar_sim.paths"
+"""The entry points by which other packages bring kinds of paths."""
 
 PathSpec = Circle | Csv | Ellipse | FigureEight | Gait | Hop | Line | Lines | Step
 KINDS: dict[str, type[FootPath]] = {
     str(kind.__struct_config__.tag): kind for kind in get_args(PathSpec)
 }
+
+
+def kinds() -> dict[str, type[FootPath]]:
+    """Return every kind of path by name: the shipped ones, then those of other packages.
+
+    Raises:
+        ConfigError: One of another package has a shipped kind's name, cannot be loaded, or is no
+            `FootPath` with its name as tag.
+    """
+    found = dict(KINDS)
+    for name, entry in installed(GROUP, "path").items():
+        if name in KINDS:
+            raise ConfigError(f"path {name!r} of {entry.value} has the name of a shipped kind")
+        kind = load(entry, "path")
+        if not (isinstance(kind, type) and issubclass(kind, FootPath)):
+            raise ConfigError(f"path {name!r}: {entry.value} must be a FootPath, got {kind!r}")
+        if kind.__struct_config__.tag != name:
+            raise ConfigError(
+                f"path {name!r}: {entry.value} must have its name as tag, got "
+                f"{kind.__struct_config__.tag!r}"
+            )
+        found[name] = kind
+    return found

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -36,8 +36,12 @@ SHORT = {"leg": "preset", "servo": "preset", "scene": "kind"}
 BY_METRIC = ("limits", "converge")
 """Tables whose keys are metrics."""
 
-KINDS_OF = {"path": paths.KINDS, "scene": scenes.KINDS, "force": forces.KINDS}
-"""Tables whose `kind` decides which other keys they have."""
+KINDS_OF: dict[str, Callable[[], Mapping[str, type[Any]]]] = {
+    "path": paths.kinds,
+    "scene": lambda: scenes.KINDS,
+    "force": lambda: forces.KINDS,
+}
+"""Tables whose `kind` decides which other keys they have, and the kinds that there are."""
 
 
 def change(table: Table, parts: list[str], value: Any, where: str) -> None:
@@ -63,8 +67,8 @@ def change(table: Table, parts: list[str], value: Any, where: str) -> None:
         return
 
     # Left in, a key of the old kind would be refused as unknown, though nobody asked for it.
-    if top in KINDS_OF and parts == [top, "kind"] and value in KINDS_OF[top]:
-        known = tables.keys(KINDS_OF[top][value])
+    if top in KINDS_OF and parts == [top, "kind"] and value in (kinds := KINDS_OF[top]()):
+        known = tables.keys(kinds[value])
         table[top] = {k: v for k, v in table[top].items() if k in known}
 
     if parts == ["controller", "name"] and value in control.known():
@@ -178,7 +182,7 @@ def _preset(
 
 def _kind(name: str, value: Any, where: str) -> type[Any]:
     """Return the class named by a table's `kind`."""
-    known = KINDS_OF[name]
+    known = KINDS_OF[name]()
     if not isinstance(value, dict) or "kind" not in value:
         raise ConfigError(f"{where}: [{name}] needs a kind; known: {', '.join(sorted(known))}")
     kind = value["kind"]
