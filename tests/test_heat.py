@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,8 +14,9 @@ from fivebar_sim import rollout
 from fivebar_sim.control.servo import Servo
 from fivebar_sim.dynamics import heat
 from fivebar_sim.dynamics.heat import Cooling, Winding
-from fivebar_sim.errors import ArgumentError, ConfigError
+from fivebar_sim.errors import ArgumentError, ConfigError, RunDirectoryError
 from fivebar_sim.rollout import Result
+from fivebar_sim.runs import stored
 from fivebar_sim.scenario import Scenario
 
 COOLING = Cooling(resistance=34.0, time=92.0, hottest=70.0, ambient=20.0)
@@ -220,3 +223,14 @@ def test_a_limit_on_what_this_servo_does_not_tell_is_refused(key: str, needs: st
     with pytest.raises(ConfigError, match=rf"limits\.load\.{key} needs {needs}: this servo has"):
         Scenario.load("classic-ellipse", [f"limits.load.{key}=1"])
     assert Scenario.load("q8bot-xl330", [f"limits.load.{key}=100"]).limits
+
+
+def test_a_stored_run_without_the_heat_that_it_limits_is_refused(tmp_path: Path) -> None:
+    holding(0.5, "limits.load.survives=1").write(tmp_path / "run")
+    file = tmp_path / "run" / "metrics.json"
+    assert stored.read(tmp_path / "run").metrics["load"]["survives"] < 1.0
+    table = json.loads(file.read_text("utf-8"))
+    del table["load"]["survives"]
+    file.write_text(json.dumps(table), "utf-8")
+    with pytest.raises(RunDirectoryError, match=r"load.survives is missing: run its scenario"):
+        stored.read(tmp_path / "run")

@@ -12,9 +12,9 @@ from fivebar_sim.control import Feedback
 from fivebar_sim.control.servo import Drive
 from fivebar_sim.files import tables
 from fivebar_sim.metrics import load
-from fivebar_sim.metrics.catalogue import GROUND_KEYS, LISTED, SHOWN
+from fivebar_sim.metrics.catalogue import LISTED, SHOWN
 from fivebar_sim.metrics.columns import motors
-from fivebar_sim.metrics.limits import Limit, judge
+from fivebar_sim.metrics.limits import Limit, has, judge
 from fivebar_sim.metrics.tracking import tracking_error
 from fivebar_sim.recording.plots import SHARE_WINDOW
 from fivebar_sim.runs.stored import StoredRun
@@ -36,11 +36,10 @@ def name_of(run: StoredRun) -> str:
 def keys(run: StoredRun) -> list[str]:
     """Return the keys of the metrics to list of a run, in reading order.
 
-    Those of a ground only where there is one, and those that repeat another if they have a limit.
+    Those that the run has, and those that repeat another if they have a limit.
     """
-    grounded = "ground_z" in run.record
     listed = {*LISTED, *run.scenario.limits}
-    return [key for key in SHOWN if key in listed and (grounded or key not in GROUND_KEYS)]
+    return [key for key in SHOWN if key in listed and has(run.metrics, key)]
 
 
 def limits(run: StoredRun) -> list[Limit]:

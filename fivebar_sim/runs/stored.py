@@ -18,6 +18,7 @@ from fivebar_sim.metrics.columns import (
     RAIL_COLUMN,
     Record,
 )
+from fivebar_sim.metrics.limits import has
 from fivebar_sim.metrics.measured import Judged
 from fivebar_sim.runs import directory, stored_metrics
 from fivebar_sim.scenario import Scenario
@@ -87,6 +88,12 @@ def read(path: Path) -> StoredRun:
     _check_plausible(path / "rollout.parquet", record, scenario.sim.timestep)
     grounded = isinstance(scenario.scene, Ground)
     measured = stored_metrics.read(path / "metrics.json", grounded=grounded)
+    for key in scenario.limits:
+        # What only some servos have is no field that every run must have.
+        if not has(measured.table, key):
+            raise RunDirectoryError(
+                f"{path / 'metrics.json'}: {key} is missing: run its scenario.toml again"
+            )
 
     return StoredRun(path, scenario, record, measured)
 
