@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import shutil
 from collections.abc import Callable
 from pathlib import Path
@@ -66,6 +67,20 @@ def _shortened(run: Path) -> None:
     pyarrow.parquet.write_table(pyarrow.parquet.read_table(file).slice(0, 700), file)
 
 
+def _doubled(run: Path, column: str) -> None:
+    file = run / "rollout.parquet"
+    table = pyarrow.parquet.read_table(file)
+    pyarrow.parquet.write_table(table.append_column(column, table[column]), file)
+
+
+def _worded(run: Path, column: str) -> None:
+    file = run / "rollout.parquet"
+    table = pyarrow.parquet.read_table(file)
+    words = pyarrow.array(["0.0"] * len(table))
+    table = table.set_column(table.column_names.index(column), column, words)
+    pyarrow.parquet.write_table(table, file)
+
+
 @pytest.mark.parametrize(
     ("damage", "said"),
     [
@@ -73,6 +88,8 @@ def _shortened(run: Path) -> None:
         (_foreign, "rollout.parquet is not a record: it lacks the column target_x"),
         (lambda run: _changed(run, "gap", None), "column gap must be numbers, all there"),
         (lambda run: _changed(run, "gap", float("nan")), "column gap is not finite"),
+        (lambda run: _doubled(run, "gap"), "not a record: it has the column gap twice"),
+        (lambda run: _worded(run, "gap"), "column gap must be numbers, all there"),
         (_shortened, "a run of 0.8 s at 0.001 s has 800 rows, got 700"),
         (lambda run: (run / "rollout.parquet").write_bytes(b""), "is not a record, or is damaged"),
         (lambda run: (run / "metrics.json").write_text("{"), "metrics.json is not JSON: "),
@@ -115,3 +132,49 @@ def test_damage_is_named(
     assert said in message
     assert str(run) in message
     assert "\n" not in message
+
+
+def _long(run: Path) -> None:
+    """Give the record a thousand times its rows, each column a constant."""
+    file = run / "rollout.parquet"
+    table = pyarrow.parquet.read_table(file)
+    column = pyarrow.repeat(0.0, 1000 * len(table))
+    pyarrow.parquet.write_table(pyarrow.table(dict.fromkeys(table.column_names, column)), file)
+
+
+def _never(*args: object, **options: object) -> None:
+    raise AssertionError("its rows were read")
+
+
+@pytest.mark.parametrize(
+    ("damage", "said"),
+    [
+        (_long, "a run of 0.8 s at 0.001 s has 800 rows, got 800000"),
+        (lambda run: _doubled(run, "gap"), "it has the column gap twice"),
+        (lambda run: _worded(run, "gap"), "column gap must be numbers, all there"),
+    ],
+)
+def test_what_is_too_much_is_refused_before_its_rows_are_read(
+    written: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    damage: Callable[[Path], object],
+    said: str,
+) -> None:
+    """A file of 8 MB can hold 1e8 rows of a constant, which would take 24 GB."""
+    run = shutil.copytree(written, tmp_path / "run")
+    damage(run)
+    monkeypatch.setattr(pyarrow.parquet, "read_table", _never)
+    monkeypatch.setattr(pyarrow.parquet.ParquetFile, "read", _never)
+    with pytest.raises(RunDirectoryError, match=re.escape(said)) as caught:
+        stored.read(run)
+    assert str(caught.value).count(str(run)) == 1
+
+
+def test_columns_of_others_are_left_out(result: Result, written: Path, tmp_path: Path) -> None:
+    run = shutil.copytree(written, tmp_path / "run")
+    file = run / "rollout.parquet"
+    table = pyarrow.parquet.read_table(file)
+    table = table.append_column("mine", pyarrow.array(["x"] * len(table)))
+    pyarrow.parquet.write_table(table, file)
+    assert list(stored.read(run).record) == list(result.record)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -23,6 +23,9 @@ from fivebar_sim.metrics.measured import Judged
 from fivebar_sim.runs import directory, stored_metrics
 from fivebar_sim.scenario import Scenario
 from fivebar_sim.scenario.scenes import Ground, Treadmill
+
+if TYPE_CHECKING:
+    from pyarrow.parquet import ParquetFile
 
 MOST = {"theta_dot": SPEED_LIMIT, "torque": load.LARGEST}
 """Largest number in columns whose names begin so [rad/s, N m]; `simulate` and `load` ensure it."""
@@ -70,22 +73,9 @@ def read(path: Path) -> StoredRun:
     except FiveBarError as error:
         raise RunDirectoryError(f"{path} cannot be read as a run: {error}") from None
 
-    record = _record(path / "rollout.parquet")
-    for name in _own_columns(scenario):
-        if name not in record:
-            raise RunDirectoryError(
-                f"{path / 'rollout.parquet'} is not a record of the scene "
-                f"{scenario.scene.kind!r}: it lacks the column {name}"
-            )
-
-    rows = len(record["time"])
-    if rows != scenario.steps:
-        raise RunDirectoryError(
-            f"{path / 'rollout.parquet'}: a run of {scenario.duration:g} s at "
-            f"{scenario.sim.timestep:g} s has {scenario.steps} rows, got {rows}"
-        )
-
-    _check_plausible(path / "rollout.parquet", record, scenario.sim.timestep)
+    file = path / "rollout.parquet"
+    record = _record(file, scenario)
+    _check_plausible(file, record, scenario.sim.timestep)
     grounded = isinstance(scenario.scene, Ground)
     measured = stored_metrics.read(path / "metrics.json", grounded=grounded)
     for key in scenario.limits:
@@ -134,15 +124,21 @@ def _own_columns(scenario: Scenario) -> list[str]:
     return columns
 
 
-def _record(file: Path) -> Record:
-    """Return the columns of a record."""
+def _record(file: Path, scenario: Scenario) -> Record:
+    """Return the columns of a scenario's record."""
     import pyarrow
     import pyarrow.parquet
 
     try:
         # Given a name instead of a file, pyarrow would expand ~ and read it as a URI.
         with file.open("rb") as stream:
-            table = pyarrow.parquet.read_table(stream, page_checksum_verification=True)
+            parquet = pyarrow.parquet.ParquetFile(stream, page_checksum_verification=True)
+            # Before the rows: some megabytes can hold a thousand times as much.
+            _check_layout(file, parquet, scenario)
+            table = parquet.read(columns=[*COLUMNS, *_own_columns(scenario)])
+    # It is an OSError too.
+    except RunDirectoryError:
+        raise
     except (OSError, pyarrow.ArrowException) as error:
         if isinstance(error, OSError) and error.strerror:
             raise RunDirectoryError(f"cannot read {file}: {error.strerror}") from None
@@ -150,19 +146,44 @@ def _record(file: Path) -> Record:
         message = " ".join(str(error).split())
         raise RunDirectoryError(f"{file} is not a record, or is damaged: {message}") from None
 
-    missing = [name for name in COLUMNS if name not in table.column_names]
-    if missing:
-        raise RunDirectoryError(f"{file} is not a record: it lacks the column {missing[0]}")
-
     record: Record = {}
     for name in table.column_names:
         column = table[name]
-        if not pyarrow.types.is_float64(column.type) or column.null_count or not len(column):
-            raise RunDirectoryError(
-                f"{file} is not a record: column {name} must be numbers, all there"
-            )
+        if column.null_count:
+            raise RunDirectoryError(_not_numbers(file, name))
         record[name] = column.to_numpy()
         if not np.isfinite(record[name]).all():
             raise RunDirectoryError(f"{file} is not a record: column {name} is not finite")
 
     return record
+
+
+def _check_layout(file: Path, parquet: ParquetFile, scenario: Scenario) -> None:
+    """Raise unless a record has the columns and as many rows as its scenario's runs have.
+
+    Raises:
+        RunDirectoryError: Names the column, or both numbers of rows.
+    """
+    import pyarrow
+
+    schema = parquet.schema_arrow
+    own = _own_columns(scenario)
+    for name in (*COLUMNS, *own):
+        if name not in schema.names:
+            of = f" of the scene {scenario.scene.kind!r}" if name in own else ""
+            raise RunDirectoryError(f"{file} is not a record{of}: it lacks the column {name}")
+        if schema.names.count(name) > 1:
+            raise RunDirectoryError(f"{file} is not a record: it has the column {name} twice")
+        if not pyarrow.types.is_float64(schema.field(name).type):
+            raise RunDirectoryError(_not_numbers(file, name))
+
+    rows = parquet.metadata.num_rows
+    if rows != scenario.steps:
+        raise RunDirectoryError(
+            f"{file}: a run of {scenario.duration:g} s at {scenario.sim.timestep:g} s has "
+            f"{scenario.steps} rows, got {rows}"
+        )
+
+
+def _not_numbers(file: Path, name: str) -> str:
+    return f"{file} is not a record: column {name} must be numbers, all there"
