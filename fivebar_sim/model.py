@@ -298,7 +298,7 @@ def _drive(spec: mujoco.MjSpec, servo: Servo | None, drive: Drive) -> None:
         if drive == "torque":
             actuator.set_to_motor()
         elif servo is not None:
-            actuator.set_to_position(kp=servo.kp, kv=0.0 if servo.speed is None else servo.kd)
+            actuator.set_to_position(kp=servo.kp, kv=0.0 if servo.limit is None else servo.kd)
         if servo is None:
             continue
         if servo.friction > 0.0:

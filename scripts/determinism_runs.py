@@ -29,40 +29,63 @@ class Plain:
         """Give each leg its own model, and begin anew."""
         self._models = list(models)
         self._datas = [mujoco.MjData(model) for model in self._models]
+        self.time = np.zeros(self.nsim)
+        self.qpos = np.array([data.qpos for data in self._datas])
+        self.qvel = np.array([data.qvel for data in self._datas])
+        self.qacc_warmstart = np.zeros_like(self.qvel)
+        self.warning = np.zeros((self.nsim, len(self._datas[0].warning.number), 2), np.int32)
 
-    def __setattr__(self, name: str, value: Any) -> None:
-        if name != "qpos":
-            return object.__setattr__(self, name, value)
-        for data, row in zip(self._datas, value, strict=True):
-            data.qpos[:] = row
-        return None
-
-    @property
-    def warning(self) -> np.ndarray:
-        """(last info, count) of every kind of warning, (nsim, n, 2)."""
-        return np.array([[d.warning.lastinfo, d.warning.number] for d in self._datas]).swapaxes(
-            1, 2
-        )
-
-    def rollout(self, steps: int, ctrl: np.ndarray, record: Sequence[Any]) -> dict[Any, Any]:
-        """Return what is recorded after each of the next steps, (nsim, steps, ...)."""
+    def rollout(
+        self,
+        steps: int,
+        control: np.ndarray,
+        control_spec: int = int(mujoco.mjtState.mjSTATE_CTRL),
+        record: Sequence[Any] = (),
+        ids: Any = None,
+    ) -> dict[Any, Any]:
+        """Return what is recorded after each of the next steps, (n, steps, ...)."""
         rows: dict[Any, list] = {item: [] for item in record}
-        for model, data, commands in zip(self._models, self._datas, ctrl, strict=True):
-            for item, recorded in zip(record, _stepped(model, data, commands, record), strict=True):
+        for i, given in zip(range(self.nsim) if ids is None else ids, control, strict=True):
+            data = self._load(i)
+            stepped = _stepped(self._models[i], data, given, control_spec, record)
+            self._save(i)
+            for item, recorded in zip(record, stepped, strict=True):
                 rows[item].append(recorded)
         return {item: np.stack(each) for item, each in rows.items()}
 
+    def _load(self, i: int) -> Any:
+        data = self._datas[i]
+        data.time = self.time[i]
+        data.qpos[:] = self.qpos[i]
+        data.qvel[:] = self.qvel[i]
+        data.qacc_warmstart[:] = self.qacc_warmstart[i]
+        data.warning.lastinfo[:] = self.warning[i, :, 0]
+        data.warning.number[:] = self.warning[i, :, 1]
+        return data
 
-def _stepped(model: Any, data: Any, commands: np.ndarray, record: Sequence[Any]) -> list[Any]:
-    """Return what is recorded of one leg; at MuJoCo's first warning it stops, and rows repeat."""
+    def _save(self, i: int) -> None:
+        data = self._datas[i]
+        self.time[i] = data.time
+        self.qpos[i] = data.qpos
+        self.qvel[i] = data.qvel
+        self.qacc_warmstart[i] = data.qacc_warmstart
+        self.warning[i, :, 0] = data.warning.lastinfo
+        self.warning[i, :, 1] = data.warning.number
+
+
+def _stepped(
+    model: Any, data: Any, given: np.ndarray, spec: int, record: Sequence[Any]
+) -> list[Any]:
+    """Return what is recorded of one leg; at a new warning of MuJoCo it stops, and rows repeat."""
     rows = [[] for _ in record]
-    for command in commands:
-        if not data.warning.number.any():
-            data.ctrl[:] = command
+    warned = data.warning.number.copy()
+    for each in given:
+        if (data.warning.number == warned).all():
+            mujoco.mj_setState(model, data, each, spec)
             mujoco.mj_step(model, data)
-        for item, each in zip(record, rows, strict=True):
-            each.append(_read(model, data, item))
-    return [np.array(each) for each in rows]
+        for item, row in zip(record, rows, strict=True):
+            row.append(_read(model, data, item))
+    return [np.array(row) for row in rows]
 
 
 def _read(model: Any, data: Any, item: Any) -> np.ndarray:

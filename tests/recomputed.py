@@ -165,10 +165,9 @@ def _clips(run: Run) -> Bools:
     if run.scenario["controller"]["name"] != "servo":
         return np.abs(u) > servo["limit"]
     theta = np.column_stack([run.before(f"theta_{m}") for m in "AE"])
-    rate = np.column_stack([run.before(f"theta_dot_{m}") for m in "AE"])
-    asked = servo["kp"] * (u - theta)
-    if "speed" in servo:
-        asked = asked - servo["kd"] * rate
+    if run.scenario["sim"]["integrator"] == "discrete":
+        theta = run.pair("theta")
+    asked = servo["kp"] * (u - theta) - servo["kd"] * run.pair("theta_dot")
     return np.abs(asked) > servo["limit"]
 
 

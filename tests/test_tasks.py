@@ -173,11 +173,11 @@ def test_leg_arrays_move_as_each_alone(lengths: list[float]) -> None:
 @pytest.mark.parametrize("speed", [None, 40.0])
 def test_servo_arrays_apply_what_each_servo_does(speed: float | None, drive: Drive) -> None:
     servos = [Servo(kp=kp, kd=kd, limit=0.3, speed=speed) for kp, kd in ((2.0, 0.1), (9.0, 0.02))]
-    ctrl, q, v, q_next, v_next = np.random.default_rng(2).normal(size=(5, 2, 4, 2))
+    ctrl, q, q_next, v_next = np.random.default_rng(2).normal(size=(4, 2, 4, 2))
     both = ServoArrays.of(servos)
-    together = applied_torque(both, "discrete", ctrl, q, v, q_next, v_next, drive)
+    together = applied_torque(both, "discrete", ctrl, q, q_next, v_next, drive)
     for row, servo in enumerate(servos):
-        own = (ctrl[row], q[row], v[row], q_next[row], v_next[row])
+        own = (ctrl[row], q[row], q_next[row], v_next[row])
         alone = applied_torque(servo, "discrete", *own, drive)
         np.testing.assert_array_equal(together[row], alone)
 

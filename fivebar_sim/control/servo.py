@@ -34,12 +34,11 @@ way round is shorter."""
 class Servo(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """The servo at each motor: ideal without `speed`, with it a DC motor.
 
-        position:  tau = clip(kp (u - q), limit) - kd v                       without speed
-                   tau = clip(kp (u - q) - kd v, limit) - (limit / speed) v   with it
+        position:  tau = clip(kp (u - q) - kd v, limit) - (limit / speed) v
         torque:    tau = clip(u, limit) - (limit / speed) v                   0 without speed
 
-    In MuJoCo limit is the actuator's forcerange, and the term outside the clip is the damping of
-    the motor's joint: the integrator treats it implicitly, also while the limit clips.
+    Both hold with the torque that a step ends with: see `applied_torque`. In MuJoCo limit is the
+    actuator's forcerange, and the term outside the clip is the damping of the motor's joint.
 
     Attributes:
         kp: Position gain [N m/rad].
@@ -236,26 +235,21 @@ def read_table(source: str | Path) -> tables.Table:
 
 
 def saturated(
-    servo: Servo | ServoArrays, ctrl: Array, q: Array, v: Array, drive: Drive = "position"
+    servo: Servo | ServoArrays,
+    integrator: Integrator,
+    ctrl: Array,
+    q: Array,
+    q_next: Array,
+    v_next: Array,
+    drive: Drive = "position",
 ) -> Bools:
-    """Return whether the limit clips in a step; the state at the step's start decides.
+    """Return whether the limit clips the torque that a step ends with.
 
-        position:  |kp (u - q)| > limit,  with speed |kp (u - q) - kd v| > limit
-        torque:    |u| > limit
-
-    Args:
-        servo: The servo.
-        ctrl: Commands u of the step [rad or N m].
-        q: Motor angles before the step [rad].
-        v: Motor rates before the step [rad/s].
-        drive: Whether commands are angles or torques.
-
-    Returns:
-        Truth values, same shape as the arguments.
+    Args and shapes are those of `applied_torque`.
     """
     if servo.limit is None:
         return np.zeros(np.shape(ctrl), dtype=bool)
-    return np.abs(_asked(servo, ctrl, q, v, drive)) > servo.limit
+    return np.abs(_asked(servo, integrator, ctrl, q, q_next, v_next, drive)) > servo.limit
 
 
 def applied_torque(
@@ -263,29 +257,27 @@ def applied_torque(
     integrator: Integrator,
     ctrl: Array,
     q: Array,
-    v: Array,
     q_next: Array,
     v_next: Array,
     drive: Drive = "position",
 ) -> Array:
-    """Return the motor torque that MuJoCo's integrator applied over a step.
+    """Return the motor torque that was applied over a step.
 
     The actuator sensor shows kp (u - q), the force before the implicit update; what enters the
     step's momentum balance is, with (q, v) before the step and (q+, v+) after it,
 
-        discrete:      tau = kp (u - q+) - kd v+ - (limit / speed) v+
-        implicitfast:  tau = kp (u - q)  - kd v+ - (limit / speed) v+
-        torque drive:  tau = u - (limit / speed) v+
+        discrete:      tau = clip(kp (u - q+) - kd v+, limit) - (limit / speed) v+
+        implicitfast:  tau = clip(kp (u - q)  - kd v+, limit) - (limit / speed) v+
+        torque drive:  tau = clip(u, limit) - (limit / speed) v+
 
-    Where the limit clips (see `saturated`) the terms that it clips are limit, with their sign at
-    the start of the step: with speed kp and kd, without it kp alone, in torque drive u.
+    `simulation.limited` keeps the limit so; MuJoCo alone decides with the step's start whether it
+    clips.
 
     Args:
         servo: The servo.
         integrator: MuJoCo's integrator of the run.
         ctrl: Commands u of the step [rad or N m].
         q: Motor angles before the step [rad].
-        v: Motor rates before the step [rad/s].
         q_next: Motor angles after it [rad].
         v_next: Motor rates after it [rad/s].
         drive: Whether commands are angles or torques.
@@ -293,12 +285,9 @@ def applied_torque(
     Returns:
         Torque of each motor [N m], same shape as the arguments.
     """
-    # MuJoCo's `discrete` integrator lets the spring act at the end of the step, not at its start.
-    asked = _asked(servo, ctrl, q_next if integrator == "discrete" else q, v_next, drive)
+    asked = _asked(servo, integrator, ctrl, q, q_next, v_next, drive)
     if servo.limit is not None:
-        # MuJoCo decides clipping, and its sign, with the state at the start under both integrators.
-        side = np.sign(_asked(servo, ctrl, q, v, drive))
-        asked = np.where(saturated(servo, ctrl, q, v, drive), side * servo.limit, asked)
+        asked = np.clip(asked, -servo.limit, servo.limit)
     passive = servo.kd if _is_kd_passive(servo, drive) else servo.back_emf
     return asked - passive * v_next
 
@@ -309,13 +298,22 @@ def _back_emf(servo: Servo | ServoArrays) -> float:
 
 
 def _is_kd_passive(servo: Servo | ServoArrays, drive: Drive) -> bool:
-    """Return whether kd is the joint's damping, and not within what the limit clips."""
-    return servo.speed is None and drive == "position"
+    """Return whether kd is the joint's damping: only where no limit can clip it."""
+    return servo.limit is None and drive == "position"
 
 
-def _asked(servo: Servo | ServoArrays, ctrl: Array, q: Array, v: Array, drive: Drive) -> Array:
-    """Return the torque before the limit clips it [N m]."""
+def _asked(
+    servo: Servo | ServoArrays,
+    integrator: Integrator,
+    ctrl: Array,
+    q: Array,
+    q_next: Array,
+    v_next: Array,
+    drive: Drive,
+) -> Array:
+    """Return the torque at the end of a step before the limit clips it [N m]."""
     if drive == "torque":
         return ctrl
-    spring = servo.kp * (ctrl - q)
-    return spring if servo.speed is None else spring - servo.kd * v
+    # MuJoCo's `discrete` integrator lets the spring act at the end of the step, not at its start.
+    spring = servo.kp * (ctrl - (q_next if integrator == "discrete" else q))
+    return spring if servo.limit is None else spring - servo.kd * v_next

@@ -36,7 +36,7 @@ def columns(planned: Plan, states: States, begin: int = 0) -> Record:
         planned: The plan that was simulated.
         states: The states of this one simulation, all steps or some.
         begin: Index of the first of these states. If above 0, the state before it is not known:
-            its torque is computed as if the leg had been at rest in the planned pose.
+            its torque is computed as if the leg had been in the planned pose.
     """
     leg = planned.scenario.leg
     wanted = planned.motion
@@ -62,13 +62,6 @@ def _joints(states: States) -> tuple[Array, Array, Array]:
     return states.qpos[0, :, -4:], states.qvel[0, :, -4:], states.ctrl[0, :, -2:]
 
 
-def _before(planned: Plan, states: States, begin: int = 0) -> tuple[Array, Array]:
-    """Return motor angles and rates before each step, the first at rest in the planned pose."""
-    q, v, _ = _joints(states)
-    q = np.concatenate([planned.motion.q[begin : begin + 1], q[:-1]])
-    return q[:, MOTOR_JOINTS], np.concatenate([np.zeros((1, 4)), v[:-1]])[:, MOTOR_JOINTS]
-
-
 def _drive(planned: Plan) -> Drive:
     # A controller that plans has no `drive`: its setpoints are angles.
     return getattr(planned.scenario.controller, "drive", "position")
@@ -77,16 +70,18 @@ def _drive(planned: Plan) -> Drive:
 def _torque(planned: Plan, states: States, begin: int) -> Array:
     """Return the torque that each motor gave in each step [N m], (N, 2)."""
     scenario = planned.scenario
-    q_next, v_next, ctrl = _joints(states)
-    return applied_torque(
-        scenario.servo,
-        scenario.sim.integrator,
-        ctrl,
-        *_before(planned, states, begin),
-        q_next[:, MOTOR_JOINTS],
-        v_next[:, MOTOR_JOINTS],
-        _drive(planned),
-    )
+    steps = _steps(planned, states, begin)
+    return applied_torque(scenario.servo, scenario.sim.integrator, *steps, _drive(planned))
+
+
+def _steps(planned: Plan, states: States, begin: int = 0) -> tuple[Array, Array, Array, Array]:
+    """Return commands, motor angles before each step, and angles and rates after it, (N, 2) each.
+
+    The first step begins in the planned pose.
+    """
+    q, v, ctrl = _joints(states)
+    before = np.concatenate([planned.motion.q[begin : begin + 1], q[:-1]])
+    return ctrl, before[:, MOTOR_JOINTS], q[:, MOTOR_JOINTS], v[:, MOTOR_JOINTS]
 
 
 def unrecorded(planned: Plan, states: States) -> Unrecorded:
@@ -130,8 +125,9 @@ def _ranges(built: mujoco.MjModel) -> Ranges:
 
 def saturated(planned: Plan, states: States) -> Bools:
     """Return whether the torque limit clipped each motor in each step, (N, 2)."""
-    ctrl = _joints(states)[2]
-    return clipped(planned.scenario.servo, ctrl, *_before(planned, states), _drive(planned))
+    scenario = planned.scenario
+    steps = _steps(planned, states)
+    return clipped(scenario.servo, scenario.sim.integrator, *steps, _drive(planned))
 
 
 def _surroundings(planned: Plan, states: States, begin: int) -> Record:

@@ -14,9 +14,8 @@ from fivebar_sim.arrays import Array, Bools
 from fivebar_sim.errors import ArgumentError, DivergedError
 from fivebar_sim.kinematics.stops import SPEED_LIMIT
 from fivebar_sim.model import without_log
-
-STATE = mujoco.mjtState.mjSTATE_FULLPHYSICS | mujoco.mjtState.mjSTATE_CTRL
-"""What is recorded of every step: time, qpos, qvel, ctrl."""
+from fivebar_sim.simulation.clipping import Clipping
+from fivebar_sim.simulation.limited import STATE, rollout
 
 STEP = ("qfrc_constraint", "solver_niter")
 """What is recorded of every step besides."""
@@ -101,6 +100,7 @@ class Legs:
         if not shared:
             self._batch.set_models(list(models))
         self._batch.qpos = qpos
+        self._clipping = Clipping.of([first] * len(qpos) if shared else models)
         self._sizes = first.nq, first.nv, first.nu
         ground = mujoco.mj_name2id(first, mujoco.mjtObj.mjOBJ_SENSOR, "ground")
         self._ground = None if ground < 0 else int(first.sensor_adr[ground]) + 1  # after "found"
@@ -123,7 +123,10 @@ class Legs:
 
         record = (STATE, *STEP) if self._ground is None else (STATE, *STEP, "sensordata")
         with without_log():
-            out = self._batch.rollout(ctrl.shape[1], ctrl, record=record)
+            if self._clipping is None:
+                out = self._batch.rollout(ctrl.shape[1], ctrl, record=record)
+            else:
+                out = rollout(self._batch, self._clipping, ctrl, record)
 
         state = out[STATE]
         start = self._ground
@@ -135,7 +138,8 @@ class Legs:
             time=state[..., 0],
             qpos=state[..., 1 : 1 + nq],
             qvel=state[..., 1 + nq : 1 + nq + nv],
-            ctrl=state[..., -nu:],
+            # A step that keeps a torque limit may have been sent another command.
+            ctrl=np.ascontiguousarray(ctrl),
             ground=ground,
             constraint=out["qfrc_constraint"],
             iterations=out["solver_niter"].max(axis=-1),  # over the islands

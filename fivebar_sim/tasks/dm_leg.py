@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import OrderedDict
+from collections.abc import Sequence
 from typing import Any
 
 import mujoco
@@ -14,8 +15,56 @@ from dm_env import specs
 
 from fivebar_sim.arrays import Array
 from fivebar_sim.model import without_log
+from fivebar_sim.simulation.clipping import Clipping
+from fivebar_sim.simulation.limited import STATE, rollout
 from fivebar_sim.tasks import REASONS
 from fivebar_sim.tasks.episodes import Episodes, Outcome
+
+
+class _One:
+    """As much of `mujoco.batch.Batch` as `clipping.rollout` needs, for one MjData.
+
+    Attributes:
+        model: The model.
+    """
+
+    def __init__(self, model: mujoco.MjModel, data: mujoco.MjData) -> None:
+        self.model = model
+        self._data = data
+        self.qpos = data.qpos[None]
+        self.qvel = data.qvel[None]
+        self.qacc_warmstart = data.qacc_warmstart[None]
+        # Unlike the others, MjData's time is no array to be written to.
+        self.time = np.array([data.time])
+        self.warning = np.stack([data.warning.lastinfo, data.warning.number], axis=-1)[None]
+
+    def rollout(
+        self, nstep: int, control: Array, control_spec: int, record: Sequence[Any], ids: Any = None
+    ) -> dict[Any, Any]:
+        """Return what is recorded after each step, (1, nstep, ...)."""
+        del ids
+        data = self._data
+        data.time = self.time[0]
+        data.warning.lastinfo[:] = self.warning[0, :, 0]
+        data.warning.number[:] = self.warning[0, :, 1]
+        rows: dict[Any, list[Array]] = {item: [] for item in record}
+        for k in range(nstep):
+            mujoco.mj_setState(self.model, data, control[0, k], control_spec)
+            mujoco.mj_step(self.model, data)
+            for item, each in rows.items():
+                each.append(self._read(item))
+
+        self.time[0] = data.time
+        self.warning[0, :, 0] = data.warning.lastinfo
+        self.warning[0, :, 1] = data.warning.number
+        return {item: np.array(each)[None] for item, each in rows.items()}
+
+    def _read(self, item: Any) -> Array:
+        if isinstance(item, str):
+            return np.array(getattr(self._data, item))
+        state = np.empty(mujoco.mj_stateSize(self.model, int(item)))
+        mujoco.mj_getState(self.model, self._data, state, int(item))
+        return state
 
 
 class LegPhysics(Physics):
@@ -34,17 +83,16 @@ class LegPhysics(Physics):
 
     def step(self, nstep: int = 1) -> None:
         """Take nstep steps, each with its row of ctrl; the last row is repeated."""
-        # mj_step takes MuJoCo's own objects, not dm_control's wrappers of them.
-        model = self.model.ptr
-        data = self.data.ptr
-        self.qpos = np.empty((nstep, model.nq))
-        self.qvel = np.empty((nstep, model.nv))
+        # MuJoCo takes its own objects, not dm_control's wrappers of them.
+        one = _One(self.model.ptr, self.data.ptr)
+        ctrl = self.ctrl[np.minimum(np.arange(nstep), len(self.ctrl) - 1)][None]
+        clipping = Clipping.of([one.model])
         with without_log():
-            for k in range(nstep):
-                data.ctrl[:] = self.ctrl[min(k, len(self.ctrl) - 1)]
-                mujoco.mj_step(model, data)
-                self.qpos[k] = data.qpos
-                self.qvel[k] = data.qvel
+            if clipping is None:
+                states = one.rollout(nstep, ctrl, int(mujoco.mjtState.mjSTATE_CTRL), (STATE,))
+            else:
+                states = rollout(one, clipping, ctrl, (STATE,))
+        self.qpos, self.qvel = np.split(states[STATE][0, :, 1:], [one.model.nq], axis=1)
 
     @property
     def warnings(self) -> int:

@@ -169,13 +169,10 @@ class Episodes:
             q = qpos[..., MOTORS]
             v = qvel[..., MOTORS]
 
-        before = (
-            np.concatenate([self.qpos[:, None, MOTORS], q[:, :-1]], axis=1),
-            np.concatenate([self.qvel[:, None, MOTORS], v[:, :-1]], axis=1),
-        )
+        before = np.concatenate([self.qpos[:, None, MOTORS], q[:, :-1]], axis=1)
         task = self.task
         self._torque = applied_torque(
-            self._servo, task.integrator, self._ctrl, *before, q, v, task.drive
+            self._servo, task.integrator, self._ctrl, before, q, v, task.drive
         )
         self._control.moved(q, v)
         # Copies: a view of the last step would keep all steps of the period in memory.
