@@ -57,7 +57,7 @@ def test_a_landing_is_in_its_window() -> None:
     for name, peak in (("rail-landing", 1.1283), ("doggo-landing", 1.4451)):
         metrics = shipped.results()[name].metrics
         assert metrics["window"]["begin"] == 0.0
-        assert metrics["load"]["torque_peak"]["A"] == pytest.approx(peak, abs=1e-4)
+        assert metrics["load"]["torque_peak"]["A"] == pytest.approx(peak, rel=0.01)
         assert metrics["whole"]["torque_peak"]["A"] == metrics["load"]["torque_peak"]["A"]
         assert 0.09 < metrics["whole"]["at"]["torque_peak"]["A"] < 0.14
 
