@@ -56,7 +56,7 @@ CASES = (
     ),
     (
         "q8bot-trot",
-        ("servo=hobby-9g",),
+        ("servo=hobby-9g", "guards.heat=100"),
         "torque",
         "guard torque: a motor's torque had been clipped for more than 50 % of a second at",
     ),

@@ -103,13 +103,16 @@ def test_the_heat_of_the_hotter_motor_counts() -> None:
     assert found.used == other.used == found.watts[1] / COOLING.allowed
 
 
-def test_a_clipped_motor_is_on_its_line_and_never_beyond() -> None:
+def test_a_clipped_motor_is_on_its_line() -> None:
     result = rollout.run(Scenario.load("q8bot-xl330", ["limits={}", "path.frequency=5"]))
     load = result.metrics["load"]
     assert load["saturated"]["A"] > 0.0
-    for motor in "AE":
-        assert load["line"][motor] <= 1.0 + 1e-12
-    assert max(load["line"].values()) == pytest.approx(1.0, rel=1e-12)
+    # MuJoCo clips with the angle at a step's start, so the torque of a step that it leaves alone
+    # may end beyond by what the spring gains in it.
+    servo = result.scenario.servo
+    assert servo.limit is not None
+    beyond = servo.kp * 1e-3 * max(result.metrics["speed_peak"].values()) / servo.limit
+    assert 1.0 - 1e-12 <= max(load["line"].values()) <= 1.0 + beyond
 
 
 def test_without_load_a_motor_at_its_speed_is_on_the_line() -> None:

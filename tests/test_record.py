@@ -38,7 +38,6 @@ SCENES = {
 FORCE = "time_s,x_N,z_N\n0,0,0\n0.3,0,-1\n0.6,0.5,0\n"
 
 
-@cache
 WHOLE_SERVO = (
     *("servo.limit=5.0", "servo.speed=200.0", "servo.kt=1.0", "servo.resistance=1.0"),
     *("servo.thermal_resistance=1.0", "servo.thermal_time=60.0", "servo.temperature_max=80.0"),
@@ -46,6 +45,7 @@ WHOLE_SERVO = (
 """A servo's table with all that its metrics come from."""
 
 
+@cache
 def done(kind: str, *settings: str) -> tuple[Plan, Result]:
     base = ["limits={}", "duration=0.6", "path.frequency=4", "path.ramp=0.1"]
     plan = rollout.plan(Scenario.load("classic-ellipse", [*base, *SCENES[kind], *settings]))

@@ -88,6 +88,34 @@ def test_leg_is_a_preset_a_table_with_changes_or_a_file_beside(tmp_path: Path) -
         assert (beside.L1, beside.L4, beside.name) == (0.05, 0.05, "long")
 
 
+def test_the_rotor_comes_with_the_servo_unless_the_leg_says_otherwise(tmp_path: Path) -> None:
+    servo = Servo.load("xl330")
+    assert servo.armature is not None
+
+    def armature(*settings: str) -> float:
+        return Scenario.load("classic-ellipse", settings).leg.armature
+
+    own = FiveBar.load("classic").armature
+    assert armature() == armature("servo=ideal") == own != servo.armature
+    assert armature("servo=xl330") == armature("leg=minitaur", "servo=xl330") == servo.armature
+    assert armature("servo=xl330", "servo.armature=3e-4") == 3e-4
+    assert armature("servo=xl330", "leg.armature=2e-5") == 2e-5
+
+    # Who writes a leg's file knows its motors; a shipped leg has none of its own.
+    lengths = "L1 = 0.04\nL2 = 0.06\nL3 = 0.06\nL4 = 0.04\nL5 = 0.03\n"
+    for text, wanted in ((lengths, servo.armature), (lengths + "armature = 2e-5\n", 2e-5)):
+        file = tmp_path / "own.toml"
+        file.write_text(text, "utf-8")
+        assert armature("servo=xl330", f"leg={file.as_posix()}") == wanted
+
+
+@pytest.mark.parametrize("name", ["xl330", "hobby-9g", "t-motor"])
+def test_the_rotor_of_a_servo_is_that_of_its_resolved_scenario(name: str) -> None:
+    scenario = Scenario.load("classic-ellipse", [f"servo={name}"])
+    again = Scenario.from_table(scenario.table(), "again", Path())
+    assert again.leg.armature == scenario.leg.armature == Servo.load(name).armature
+
+
 @pytest.mark.parametrize("timestep", [0.001, 0.00025, 0.0003, 0.01])
 @pytest.mark.parametrize(("ramp", "duration"), [(0.1, 0.6), (0.0, 0.5), (0.2, 1.0), (0.25, 4.0)])
 def test_window_is_whole_periods_after_the_ramp(

@@ -49,6 +49,8 @@ class Servo(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
         rate: Commands per second on the bus [Hz]; None for one every timestep.
         delay: Time from sending a command to its effect [s].
         resolution: Step of the angles that can be commanded [rad], counted from 0; 0 for exact.
+        armature: Rotor inertia at the output, its own by the ratio squared [kg m^2]. The leg of
+            a scenario has it, unless it says otherwise; None where it is not known.
         kt: Torque per current at the output, gear included [N m/A]; None where it is not known, and
             then no run measures heat.
         resistance: Of the winding [ohm]; goes with kt.
@@ -67,6 +69,7 @@ class Servo(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
     rate: float | None = None
     delay: float = 0.0
     resolution: float = 0.0
+    armature: float | None = None
     kt: float | None = None
     resistance: float | None = None
     thermal_resistance: float | None = None
@@ -93,6 +96,9 @@ class Servo(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
 
         check_number("delay", self.delay, "s", low=0.0)
         check_step("resolution", self.resolution)
+        if self.armature is not None:
+            check_number("armature", self.armature, "kg m^2", low=0.0, high=1e6)
+
         winding.check(self)
 
     @classmethod

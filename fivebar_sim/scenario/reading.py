@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +18,7 @@ from fivebar_sim.files import tables
 from fivebar_sim.files.tables import Table
 from fivebar_sim.geometry import FiveBar
 from fivebar_sim.integrator import ON_GROUND, Sim
-from fivebar_sim.metrics.catalogue import LIMIT_KEYS
+from fivebar_sim.metrics.catalogue import COOLING_KEYS, HEAT_KEYS, LIMIT_KEYS, LINE_KEYS
 from fivebar_sim.paths import FootPath
 from fivebar_sim.scenario import forces, scenes
 from fivebar_sim.scenario.forces import FootForce
@@ -98,10 +98,22 @@ def _is_file_name(name: str) -> bool:
     return plain and len(name.encode()) <= LONGEST_NAME
 
 
-def leg(value: Any, where: str, folder: Path) -> FiveBar:
-    """Return the leg of a preset, of a file beside the scenario, or of a table with changes."""
+def leg(value: Any, where: str, folder: Path, armature: float | None = None) -> FiveBar:
+    """Return the leg of a preset, of a file beside the scenario, or of a table with changes.
+
+    Args:
+        value: A preset's name or a table, as the scenario has it.
+        where: The scenario, for messages.
+        folder: Where the scenario's files are.
+        armature: The servo's rotor inertia [kg m^2]. The scenario's own leg.armature comes before
+            it, and so does that of a leg's file; a shipped leg has no motors of its own. None keeps
+            the leg's.
+    """
     base, own = _preset("leg", geometry.read_table, FiveBar.from_table, value, where, folder)
-    return FiveBar.from_table({**base, **own}, f"{where}: [leg]")
+    rotor = {} if armature is None else {"armature": armature}
+    preset = _table("leg", value, where).get("preset", "")
+    first, second = (rotor, base) if preset.endswith(".toml") else (base, rotor)
+    return FiveBar.from_table({**first, **second, **own}, f"{where}: [leg]")
 
 
 def servo(value: Any, where: str, folder: Path) -> Servo:
@@ -112,6 +124,23 @@ def servo(value: Any, where: str, folder: Path) -> Servo:
 
     base, own = _preset("servo", read_servo, check, value, where, folder)
     return tables.convert({**base, **own}, Servo, "servo", where)
+
+
+def check_servo_limits(limits: Iterable[str], servo: Servo, where: str) -> None:
+    """Raise if a limit is on a metric that needs more of the servo than its table says.
+
+    Raises:
+        ConfigError: Names the limit and the servo's keys that are missing.
+    """
+    needs = (
+        (HEAT_KEYS, servo.kt, "servo.kt and servo.resistance"),
+        (COOLING_KEYS, servo.thermal_resistance, "servo.thermal_resistance and what goes with it"),
+        (LINE_KEYS, servo.speed, "servo.speed"),
+    )
+    for keys, given, what in needs:
+        for key in limits:
+            if key in keys and given is None:
+                raise ConfigError(f"{where}: limits.{key} needs {what}: this servo has none")
 
 
 def sim(value: Any, scene: Scene, where: str) -> Sim:

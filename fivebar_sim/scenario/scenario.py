@@ -21,13 +21,7 @@ from fivebar_sim.files import resources, tables
 from fivebar_sim.files.tables import Table
 from fivebar_sim.geometry import FiveBar
 from fivebar_sim.integrator import Sim
-from fivebar_sim.metrics.catalogue import (
-    COOLING_KEYS,
-    GROUND_KEYS,
-    HEAT_KEYS,
-    LIMIT_KEYS,
-    LINE_KEYS,
-)
+from fivebar_sim.metrics.catalogue import GROUND_KEYS, LIMIT_KEYS
 from fivebar_sim.metrics.guards import Guards
 from fivebar_sim.paths import FootPath, Gait
 from fivebar_sim.scenario import forces, reading
@@ -180,16 +174,17 @@ class Scenario(msgspec.Struct, frozen=True, kw_only=True):
         controller_name, controller = reading.controller(table.get("controller", {}), where)
         path = reading.path(table.get("path"), where, folder)
         scene = reading.scene(table.get("scene", "air"), where)
+        servo = reading.servo(table.get("servo", {}), where, folder)
         scenario = cls(
             name=name,
-            leg=reading.leg(table.get("leg", "classic"), where, folder),
+            leg=reading.leg(table.get("leg", "classic"), where, folder, servo.armature),
             path=path,
             controller=controller,
             controller_name=controller_name,
             scene=_with_belt_speed(scene, path, where),
             duration=duration,
             force=reading.force(table.get("force"), where, folder),
-            servo=reading.servo(table.get("servo", {}), where, folder),
+            servo=servo,
             sensors=tables.convert(table.get("sensors", {}), Sensors, "sensors", where),
             sim=reading.sim(table.get("sim", {}), scene, where),
             guards=tables.convert(table.get("guards", {}), Guards, "guards", where),
@@ -375,18 +370,4 @@ def _check_scene(scenario: Scenario, where: str) -> None:
                 f"got {scene.kind!r}"
             )
 
-    _check_servo_limits(scenario, where)
-
-
-def _check_servo_limits(scenario: Scenario, where: str) -> None:
-    """Raise if a limit is on a metric that needs more of the servo than its table says."""
-    servo = scenario.servo
-    needs = (
-        (HEAT_KEYS, servo.kt, "servo.kt and servo.resistance"),
-        (COOLING_KEYS, servo.thermal_resistance, "servo.thermal_resistance and what goes with it"),
-        (LINE_KEYS, servo.speed, "servo.speed"),
-    )
-    for keys, given, what in needs:
-        for key in scenario.limits:
-            if key in keys and given is None:
-                raise ConfigError(f"{where}: limits.{key} needs {what}: this servo has none")
+    reading.check_servo_limits(scenario.limits, scenario.servo, where)
