@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import http.client
+import socket
+import struct
 import threading
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
@@ -127,3 +130,62 @@ def test_port_that_cannot_be_had_is_refused(server: web.Server) -> None:
     for port in (-1, 65536):
         with pytest.raises(ArgumentError, match=rf"^--port must be in \[0, 65535\], got {port}"):
             web.Server(port)
+
+
+def test_a_lost_connection_prints_nothing(
+    server: web.Server, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for request in (b"", b"GET /recording.rrd HTTP/1.0\r\nHo"):
+        connection = socket.create_connection(("127.0.0.1", server.port))
+        connection.sendall(request)
+        # Closed with a reset, as by a browser that is killed.
+        connection.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
+        connection.close()
+    assert ask(server)[0] == 200
+    wait_until_idle(server)
+    assert capsys.readouterr() == ("", "")
+
+
+def wait_until_idle(server: web.Server) -> None:
+    while server._begun:
+        threading.Event().wait(0.01)
+
+
+def test_an_error_of_ours_is_printed(
+    server: web.Server, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def fail(self: web.Handler) -> None:
+        raise ValueError("ours")
+
+    monkeypatch.setattr(web.Handler, "do_GET", fail)
+    with pytest.raises(http.client.RemoteDisconnected):
+        ask(server)
+    wait_until_idle(server)
+    assert "ValueError: ours" in capsys.readouterr().err
+
+
+def test_a_slow_drip_is_ended(server: web.Server, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(web, "LONGEST", 0.0)
+    monkeypatch.setattr(web.Handler, "timeout", None)  # that of a single byte
+    with socket.create_connection(("127.0.0.1", server.port)) as connection:
+        connection.sendall(b"GET / HT")
+        assert connection.recv(1) == b""
+
+
+def test_many_at_once_are_served(server: web.Server) -> None:
+    """Hundreds that say nothing and a crowd that asks, all before the server accepts any."""
+    accept = server.get_request
+    gate = threading.Event()
+
+    def late() -> tuple[socket.socket, object]:
+        gate.wait()
+        return accept()
+
+    server.get_request = late
+    silent = [socket.create_connection(("127.0.0.1", server.port), 10) for _ in range(100)]
+    gate.set()
+    with ThreadPoolExecutor(50) as pool:
+        answers = list(pool.map(lambda _: ask(server)[0], range(100)))
+    assert answers == [200] * 100
+    for each in silent:
+        each.close()

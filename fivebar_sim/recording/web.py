@@ -6,13 +6,17 @@ the viewer to do so.
 
 from __future__ import annotations
 
+import socket
 import socketserver
+import sys
+import time
 from collections.abc import Mapping
+from contextlib import suppress
 from html import escape
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from fivebar_sim.checks import check_number
 from fivebar_sim.errors import ConfigError
@@ -90,6 +94,9 @@ async function start() {
 start().catch((error) => say("The viewer did not start: " + error));
 """
 
+LONGEST = 60.0
+"""How long a connection may last [s]: on this machine a recording takes a second."""
+
 
 class Page(NamedTuple):
     """A page to serve: its media type and its bytes."""
@@ -109,6 +116,8 @@ class Server(socketserver.ThreadingTCPServer):
     allow_reuse_address = True
     # A browser that keeps its connection open does not keep the program alive.
     daemon_threads = True
+    # How many connections may wait to be accepted; with Python's own 5 the next ones wait seconds.
+    request_queue_size = 1024
 
     def __init__(self, port: int) -> None:
         """Take a port, 0 for a free one.
@@ -119,6 +128,7 @@ class Server(socketserver.ThreadingTCPServer):
         """
         check_number("--port", port, "", low=0, high=65535)
         self.pages: Mapping[str, Page] = {}
+        self._begun: dict[socket.socket, float] = {}
         try:
             super().__init__((LOOPBACK, port), Handler)
         except OSError as error:
@@ -139,6 +149,30 @@ class Server(socketserver.ThreadingTCPServer):
         """The Host headers that are answered."""
         # A foreign page can point its own host name at the loopback, to read what is served here.
         return f"{LOOPBACK}:{self.port}", f"localhost:{self.port}"
+
+    def process_request(self, request: Any, client_address: Any) -> None:
+        """Answer a connection in a thread of its own, and remember when it began."""
+        self._begun[request] = time.monotonic()
+        super().process_request(request, client_address)
+
+    def shutdown_request(self, request: Any) -> None:
+        """Close a connection."""
+        self._begun.pop(request, None)
+        super().shutdown_request(request)
+
+    def service_actions(self) -> None:
+        """End connections that last too long: a slow drip would hold its thread for ever."""
+        for request, begun in list(self._begun.items()):
+            if time.monotonic() - begun > LONGEST:
+                # Its thread finds it ended, and closes it.
+                with suppress(OSError):
+                    request.shutdown(socket.SHUT_RDWR)
+
+    def handle_error(self, request: Any, client_address: Any) -> None:
+        """Print nothing if a connection was lost; other errors as Python does."""
+        # Browsers end connections as they like; that is no error of ours.
+        if not isinstance(sys.exception(), OSError):
+            super().handle_error(request, client_address)
 
 
 class Handler(BaseHTTPRequestHandler):
