@@ -150,3 +150,9 @@ def test_refusal(arguments: list[str], message: str, capsys: pytest.CaptureFixtu
 def test_refusal_in_python(tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match="must end in"):
         workspace_map.write(FiveBar(), tmp_path / "map")
+
+
+def test_a_name_is_no_formula(tmp_path: Path) -> None:
+    out = tmp_path / "map.svg"
+    workspace_map.write(FiveBar(name="$x^{$"), out)
+    assert "$x^{$" in out.read_text(encoding="utf-8")

@@ -39,12 +39,14 @@ def write(leg: FiveBar, out: Path, path: Array | None = None) -> Map:
     """
     if out.suffix.lower() not in FORMATS:
         raise ConfigError(f"cannot draw {out}: the picture must end in {', '.join(FORMATS)}")
+    from matplotlib import rc_context
     from matplotlib.figure import Figure
 
     surveyed = survey(leg, path=path)
-    figure = Figure(figsize=(8.0, 6.4), layout="constrained")
-    _draw(figure.add_subplot(), leg, surveyed, path)
-    with whole_file.stage(out) as place:
+    # A leg's name is no formula: a $ in it stands for itself.
+    with rc_context({"text.parse_math": False}), whole_file.stage(out) as place:
+        figure = Figure(figsize=(8.0, 6.4), layout="constrained")
+        _draw(figure.add_subplot(), leg, surveyed, path)
         figure.savefig(place, dpi=150)
     return surveyed
 
