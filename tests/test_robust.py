@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import errno
+import io
 import os
 import re
 import subprocess
@@ -248,3 +250,19 @@ def test_everything_slow_is_imported_within_main() -> None:
     code = "import sys, fivebar_sim.cli; print({'numpy', 'tyro', 'rich'} & set(sys.modules))"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout == "set()\n"
+
+
+class FullDisk(io.StringIO):
+    """A stream that takes nothing."""
+
+    def write(self, text: str) -> int:
+        """Refuse."""
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+
+@pytest.mark.parametrize("args", [["run", "nowhere.toml"], ["run", "--nonsense"]])
+def test_a_message_that_cannot_be_written_leaves_the_status(
+    shell: Shell, monkeypatch: pytest.MonkeyPatch, args: list[str]
+) -> None:
+    monkeypatch.setattr("sys.stderr", FullDisk())
+    assert shell(*args).status == 2

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from contextlib import suppress
 
 from fivebar_sim.cli.plain import plain
 
@@ -18,7 +19,9 @@ TAIL = 190
 
 def say(error: BaseException | str) -> None:
     """Print a message to stderr: one short line of plain text."""
-    print(f"fivebar: {one_line(str(error))}", file=sys.stderr)  # noqa: T201
+    # Where nobody can be told, as on a full disk, the status still counts.
+    with suppress(OSError):
+        print(f"fivebar: {one_line(str(error))}", file=sys.stderr, flush=True)  # noqa: T201
 
 
 def one_line(text: str) -> str:
