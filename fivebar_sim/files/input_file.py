@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import errno
+import json
 import os
 import stat
 from pathlib import Path
+from typing import Any
 
 TEXT = 10_000_000
 """Largest TOML or JSON file [bytes]."""
@@ -29,3 +31,24 @@ def check(path: Path, most: int) -> None:
     if status.st_size > most:
         size = f"{status.st_size / 1e6:.4g} MB"
         raise OSError(errno.EFBIG, f"it must have at most {most / 1e6:g} MB, got {size}")
+
+
+def read_json(path: Path) -> Any:
+    """Return what a JSON file holds.
+
+    Raises:
+        OSError: As `check`, or it cannot be read.
+        ValueError: It is not JSON, or has a key twice: which one counts would not be clear.
+        RecursionError: It is nested too deep.
+    """
+    check(path, TEXT)
+    return json.loads(path.read_text(encoding="utf-8"), object_pairs_hook=_object)
+
+
+def _object(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    table = dict(pairs)
+    if len(table) < len(pairs):
+        keys = [key for key, _ in pairs]
+        twice = next(key for key in keys if keys.count(key) > 1)
+        raise ValueError(f"the key {twice!r:.60} is there twice")
+    return table

@@ -118,8 +118,7 @@ def read(path: Path) -> Baseline | None:
         ConfigError: It cannot be read, is damaged, or is not a baseline; names file and key.
     """
     try:
-        input_file.check(path, input_file.TEXT)
-        table = json.loads(path.read_text(encoding="utf-8"))
+        table = input_file.read_json(path)
     except FileNotFoundError:
         return None
     except OSError as error:
@@ -140,6 +139,9 @@ def read(path: Path) -> Baseline | None:
     metrics = table.get("metrics")
     if not isinstance(metrics, dict):
         raise ConfigError(f"{where}: metrics must be a table, got {metrics!r}")
+    # It would judge nothing, and look like a baseline that is met.
+    if not metrics:
+        raise ConfigError(f"{where}: metrics must have at least one metric, got none")
 
     tables.check_keys(metrics, ABSOLUTE, f"{where}: metrics")
     each = {

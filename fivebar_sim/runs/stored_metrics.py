@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import re
 from pathlib import Path
 from typing import Any, get_args
@@ -27,8 +26,7 @@ def read(file: Path, *, grounded: bool) -> Judged:
             value out of its range; names the file and the key.
     """
     try:
-        input_file.check(file, input_file.TEXT)
-        metrics = json.loads(file.read_text(encoding="utf-8"))
+        metrics = input_file.read_json(file)
     except OSError as error:
         raise RunDirectoryError(f"cannot read {file}: {error.strerror or error}") from None
     except (ValueError, RecursionError) as error:
