@@ -9,6 +9,8 @@ import pytest
 from hypothesis import HealthCheck, settings
 from shell import CSV, JUDGED, Shell
 
+from fivebar_sim.files import exchange
+
 # An ordinary run draws the same examples every time; ./scripts/test --long asks for "random".
 # Neither judges how long an example takes: that is the machine's load, not the code's fault.
 settings.register_profile(
@@ -31,3 +33,9 @@ def shell(
     (tmp_path / "short.toml").write_text(JUDGED, encoding="utf-8")
     (tmp_path / "foot.csv").write_text(CSV, encoding="utf-8")
     return Shell(tmp_path, capsys)
+
+
+@pytest.fixture
+def two_steps(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Have a system that cannot exchange two directories in one step."""
+    monkeypatch.setattr(exchange, "exchange", lambda one, other: False)

@@ -70,6 +70,7 @@ def test_many_writers_of_one_place_all_end_well(
     assert len(run.record["time"]) == run.scenario.steps
 
 
+@pytest.mark.usefixtures("two_steps")
 @pytest.mark.parametrize("there", [False, True])
 def test_a_place_taken_in_between_is_exchanged_anew(
     tmp_path: Path, results: list[Result], monkeypatch: pytest.MonkeyPatch, there: bool

@@ -6,6 +6,8 @@ import errno
 import json
 import math
 import os
+import shutil
+import sys
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NoReturn
@@ -205,7 +207,7 @@ def test_running_again_deletes_only_the_own_files_of_the_run(
     assert names(tmp_path) == {"mine"}
 
 
-@pytest.mark.usefixtures("light")
+@pytest.mark.usefixtures("light", "two_steps")
 def test_a_note_is_in_the_new_directory_before_the_old_one_is_moved(
     tmp_path: Path, result: Result, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -297,7 +299,7 @@ def test_full_disk_leaves_what_was_there(
     assert not there or names(where) == {*FILES, "notes.txt"}
 
 
-@pytest.mark.usefixtures("light")
+@pytest.mark.usefixtures("light", "two_steps")
 @pytest.mark.parametrize("error", [KeyboardInterrupt, OSError(errno.EIO, "Input/output error")])
 def test_interrupt_between_the_renames_brings_the_old_run_back(
     tmp_path: Path, result: Result, monkeypatch: pytest.MonkeyPatch, error: Any
@@ -329,3 +331,66 @@ def test_incomplete_run_is_none(tmp_path: Path, result: Result, missing: str) ->
     assert str(caught.value) == f"{where} is not a run directory: it lacks {missing}"
     with pytest.raises(RunDirectoryError, match=r"no such directory$"):
         directory.check_run(tmp_path / "nowhere")
+
+
+# exchange
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="no other system exchanges directories")
+@pytest.mark.usefixtures("light")
+def test_there_is_no_moment_without_a_run(
+    tmp_path: Path, result: Result, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What kills the program between two renames would leave none."""
+    where = result.write(tmp_path / "mine")
+    (where / "notes.txt").touch()
+
+    def never(*args: object) -> NoReturn:
+        raise AssertionError("the old run was moved aside")
+
+    monkeypatch.setattr(Path, "rename", never)
+    result.write(where)
+    assert names(where) == {*FILES, "notes.txt"}
+    assert names(tmp_path) == {"mine"}
+
+
+@pytest.mark.usefixtures("light")
+def test_a_run_without_its_recording_is_replaced(tmp_path: Path, result: Result) -> None:
+    where = result.write(tmp_path / "mine")
+    (where / "recording.rrd").unlink()
+    result.write(where)
+    assert names(where) == set(FILES)
+
+
+@pytest.mark.usefixtures("light")
+def test_a_link_to_a_run_is_replaced_by_a_run(tmp_path: Path, result: Result) -> None:
+    result.write(tmp_path / "mine")
+    (tmp_path / "link").symlink_to(tmp_path / "mine")
+    result.write(tmp_path / "link")
+    assert names(tmp_path) == {"mine", "link"}
+    assert names(tmp_path / "mine") == set(FILES)
+
+
+@pytest.mark.usefixtures("light")
+@pytest.mark.parametrize("steps", ["one", "two"])
+def test_interrupt_while_deleting_leaves_nothing(
+    tmp_path: Path,
+    result: Result,
+    monkeypatch: pytest.MonkeyPatch,
+    request: pytest.FixtureRequest,
+    steps: str,
+) -> None:
+    if steps == "two":
+        request.getfixturevalue("two_steps")
+    where = result.write(tmp_path / "mine")
+    delete = shutil.rmtree
+
+    def interrupted(path: Path, **how: bool) -> None:
+        monkeypatch.setattr(shutil, "rmtree", delete)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(shutil, "rmtree", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        result.write(where)
+    assert names(tmp_path) == {"mine"}
+    assert names(where) == set(FILES)

@@ -16,9 +16,11 @@ import tomli_w
 
 from fivebar_sim.arrays import Array
 from fivebar_sim.errors import RunDirectoryError
-from fivebar_sim.files import leftovers, whole_file
+from fivebar_sim.files import exchange, leftovers, whole_file
 from fivebar_sim.recording import rrd
 from fivebar_sim.runs.kept import FILES, keep
+
+RECORDING = "recording.rrd"
 
 ATTEMPTS = 20
 """How often the exchange is tried while other processes write to the same place."""
@@ -48,11 +50,13 @@ def write(result: rrd.Run, path: Path) -> Path:
             _fill(stage, result)
             # mkdtemp makes directories that only their owner can enter.
             stage.chmod(0o755)
+            exchange.flush(stage)
             _exchange(stage, path)
     except OSError as error:
         raise RunDirectoryError(f"cannot write {path}: {error.strerror or error}") from None
     finally:
-        shutil.rmtree(stage, ignore_errors=True)
+        # After an exchange this is the old run.
+        _delete(stage)
 
     leftovers.sweep(path)
     return path
@@ -86,7 +90,7 @@ def _is_taken(path: Path) -> bool:
     for left in reversed(range(ATTEMPTS)):
         before = _identity(path)
         try:
-            ours = path.is_dir() and (is_run(path) or not any(path.iterdir()))
+            ours = path.is_dir() and (_is_ours(path) or not any(path.iterdir()))
         except FileNotFoundError:
             continue
         taken = not ours and before is not None
@@ -102,6 +106,11 @@ def _identity(path: Path) -> tuple[int, int] | None:
     except (FileNotFoundError, NotADirectoryError):
         return None
     return found.st_dev, found.st_ino
+
+
+def _is_ours(path: Path) -> bool:
+    """Return whether a run was written at path; its recording can be rebuilt and may be gone."""
+    return all((path / name).is_file() for name in FILES if name != RECORDING)
 
 
 def is_run(path: Path) -> bool:
@@ -130,7 +139,7 @@ def _fill(stage: Path, result: rrd.Run) -> None:
     text = json.dumps(result.measured.table, indent=2, allow_nan=False)
     (stage / "metrics.json").write_text(text + "\n", encoding="utf-8")
     write_record(stage / "rollout.parquet", result.record)
-    rrd.write(stage / "recording.rrd", [result])
+    rrd.write(stage / RECORDING, [result])
 
 
 def write_record(path: Path, record: Mapping[str, Array]) -> None:
@@ -155,11 +164,14 @@ def _exchange(stage: Path, path: Path) -> None:
 
 
 def _renamed(stage: Path, path: Path) -> None:
-    """Rename stage to path; what was there is moved aside first and deleted last."""
+    """Rename stage to path, in exchange for what is there."""
     if not path.exists():
         stage.rename(path)
         return
+    if exchange.exchange(stage, path):
+        return
 
+    # Elsewhere in two steps: what is killed between them leaves the old run in its folder aside.
     aside = Path(tempfile.mkdtemp(prefix=f".{path.name}.", suffix=".old", dir=path.parent))
     old = aside / path.name
     try:
@@ -172,4 +184,17 @@ def _renamed(stage: Path, path: Path) -> None:
                 old.rename(path)
             raise
     finally:
-        shutil.rmtree(aside, ignore_errors=True)
+        _delete(aside)
+
+
+def _delete(folder: Path) -> None:
+    """Delete a directory, even if a signal comes meanwhile; of a link to one, the link."""
+    if folder.is_symlink():
+        folder.unlink()
+        return
+    try:
+        shutil.rmtree(folder, ignore_errors=True)
+    except BaseException:
+        # No signal interrupts the clean-up after another one.
+        shutil.rmtree(folder, ignore_errors=True)
+        raise
