@@ -132,9 +132,9 @@ def test_servo_is_what_was_asked(leg: FiveBar) -> None:
     for name in ("A", "E"):
         assert ideal.joint(name).damping == 0.0
         assert not ideal.actuator(name).forcelimited
-        assert driven.joint(name).damping == 0.02
+        assert driven.joint(name).damping == 0.0
         assert driven.actuator(name).gainprm[0] == 3.0
-        np.testing.assert_array_equal(driven.actuator(name).biasprm[:3], [0.0, -3.0, 0.0])
+        np.testing.assert_array_equal(driven.actuator(name).biasprm[:3], [0.0, -3.0, -0.02])
         np.testing.assert_array_equal(driven.actuator(name).forcerange, [-0.5, 0.5])
         assert driven.actuator(name).forcelimited
     assert driven.joint("B").damping == driven.joint("D").damping == 0.0

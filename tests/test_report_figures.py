@@ -39,7 +39,7 @@ def landing() -> StoredRun:
 
 def test_torques_are_within_the_band_and_reach_it() -> None:
     """What the limit clips, less what the rate costs: no step passes it, saturated ones meet it."""
-    run = stored("classic-ellipse", "duration=0.8", "servo.limit=0.004")
+    run = stored("rail-landing", "duration=1.0", "servo.limit=0.4")
     room = []
     for motor in "AE":
         band = numbers.torque_band(run, motor)
@@ -48,7 +48,7 @@ def test_torques_are_within_the_band_and_reach_it() -> None:
         room += [tau - band[0], band[1] - tau]
     assert np.min(room) == pytest.approx(0.0, abs=1e-12)
     assert run.metrics["load"]["saturated"]["A"] > 0.0
-    np.testing.assert_allclose(room[0] + room[1], 2 * 0.004, rtol=1e-12)
+    np.testing.assert_allclose(room[0] + room[1], 2 * 0.4, rtol=1e-12)
 
 
 def test_band_of_a_motor_is_its_torque_speed_line(ellipse: StoredRun) -> None:
