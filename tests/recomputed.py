@@ -44,6 +44,7 @@ def recomputed(run: Run) -> Found:
         **_peaks(run),
         **_load(run),
         **_heat(run),
+        **_beside_serial(run),
         **_ground(run),
         **_branch(run),
         **recomputed_energy.energies(run),
@@ -196,6 +197,54 @@ def _heat(run: Run) -> Found:
     if parts:
         found["load.survives"] = max(parts)
     return found
+
+
+def _beside_serial(run: Run) -> Found:
+    """Return heat and gear work as multiples of those of a serial leg in the same places."""
+    leg = run.scenario["leg"]
+    A, E = (run.record[f"theta_{m}"][run.rows] for m in "AE")
+    tau, omega = (run.pair(name)[run.rows] for name in ("torque", "theta_dot"))
+    out = leg["L6"] / leg["L2"] * np.exp(1j * leg["bend"])
+    half = 0.5 * leg["L5"] * np.exp(1j * leg["tilt"])
+    AB = leg["L1"] * np.exp(1j * A)
+    ED = leg["L4"] * np.exp(1j * E)
+    d = half + ED - (AB - half)
+    r = np.abs(d)
+    along = (leg["L2"] ** 2 - leg["L3"] ** 2 + r**2) / (2.0 * r)
+    BC = d / r * (along + 1j * leg["assembly"] * np.sqrt(leg["L2"] ** 2 - along**2))
+    DC = BC - d
+    foot = AB - half + BC + out * BC
+
+    # C moves at right angles to BC as seen from B, and to DC as seen from D
+    columns = []
+    for b, e in ((1j * AB, 0.0 * ED), (0.0 * AB, 1j * ED)):
+        p = (np.conj(BC) * b).real
+        q = (np.conj(DC) * e).real
+        area = (np.conj(BC) * DC).imag
+        c = 1j * (q * BC - p * DC) / area
+        columns.append(c + out * (c - b))
+    a, e = columns
+    force = 1j * (tau[:, 1] * a - tau[:, 0] * e) / (np.conj(a) * e).imag
+    moved = a * omega[:, 0] + e * omega[:, 1]
+
+    L1 = leg["L1"]
+    tibia = abs(leg["L2"] * (1.0 + out))
+    far = np.abs(foot)
+    if far.max() > L1 + tibia or far.min() < abs(L1 - tibia):
+        return {"load.serial_heat": None, "load.serial_friction": None}
+    bent = np.arccos((L1**2 + far**2 - tibia**2) / (2.0 * L1 * far))
+    knee = L1 * foot / far * np.exp(1j * leg["mode"][0] * bent)
+    hip_arm = 1j * foot
+    knee_arm = 1j * (foot - knee)
+    torques = [(np.conj(arm) * force).real for arm in (hip_arm, knee_arm)]
+    area = (np.conj(hip_arm) * knee_arm).imag
+    rates = [(np.conj(moved) * knee_arm).imag / area, (np.conj(hip_arm) * moved).imag / area]
+    heat = sum(t @ t for t in torques)
+    passed = sum(np.abs(t * w).sum() for t, w in zip(torques, rates, strict=True))
+    return {
+        "load.serial_heat": (tau**2).sum() / heat,
+        "load.serial_friction": np.abs(tau * omega).sum() / passed,
+    }
 
 
 def _lasting(run: Run) -> slice:

@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 from fivebar_sim import units
 from fivebar_sim.arrays import Array
+from fivebar_sim.dynamics import antagonism
 from fivebar_sim.geometry import FiveBar
 from fivebar_sim.metrics import ground, tracking
 from fivebar_sim.metrics.columns import MOTORS
@@ -179,6 +180,24 @@ CATALOGUE = (
     Metric("load.work.E.net", "work E net", 1e3, "mJ", detail=True),
     Metric("load.opposing.fraction", "motors opposed", 1e2, "%", detail=True),
     Metric("load.opposing.energy", "energy motor to motor", 1e3, "mJ", detail=True),
+    Metric(
+        key="load.serial_heat",
+        label="heat of a serial leg's",
+        scale=1e2,
+        unit="%",
+        detail=True,
+        function=antagonism.heat,
+        low=0.0,
+    ),
+    Metric(
+        key="load.serial_friction",
+        label="gear work of a serial leg's",
+        scale=1e2,
+        unit="%",
+        detail=True,
+        function=antagonism.friction,
+        low=0.0,
+    ),
     Metric(
         key="load.saturated.A",
         label="motor A saturated",
