@@ -52,7 +52,8 @@ class Guards(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
         stops: Largest angle by which a joint may lean into a stop [rad]; above 0 the stop pushes.
         rail: Largest force of the rail's end on the trunk [N].
         contact: Largest h kd / M of a leg that stands with friction under `implicitfast`; errors of
-            torques and load share are up to 0.2 times as large. See `contact.shortfall`.
+            torques and load share are up to 0.12 times as large on a rail, up to 0.7 times on a
+            belt. See `contact.shortfall`.
         heat: Largest heat of a motor's winding if the motion goes on for good, as a part of what it
             bears. See `heat.heating`.
     """
