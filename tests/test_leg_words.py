@@ -52,3 +52,9 @@ def test_console_says_what_differs(shell: Shell) -> None:
     assert said.out.splitlines()[0].strip() == (
         "short: classic leg, L2 = 62 mm; window 0.1 to 0.6 s"
     )
+
+
+def test_a_rotor_that_came_with_the_servo_is_no_difference() -> None:
+    leg = replace(CLASSIC, armature=2e-5)
+    assert leg_words(leg, 2e-5) == "classic leg"
+    assert leg_words(leg, 3e-5) == leg_words(leg) == "classic leg, armature = 20000 g mm2"

@@ -44,8 +44,9 @@ def verdict(ok: bool) -> str:
 def print_result(result: Result, where: str, console: Console) -> None:
     """Print one run: its metrics with their limits, the verdict, and the run directory."""
     window = result.measured.window
+    scenario = result.scenario
     title = (
-        f"{result.scenario.name}: {leg_words(result.scenario.leg)}; "
+        f"{scenario.name}: {leg_words(scenario.leg, scenario.servo.armature)}; "
         f"window {window.begin:.4g} to {window.end:.4g} s"
     )
     columns = ("metric", "window", "whole run", "limit", "verdict")

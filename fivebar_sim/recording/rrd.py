@@ -156,7 +156,7 @@ def _send(stream: rr.RecordingStream, runs: Sequence[Run], names: list[str]) -> 
         names,
         [run.measured for run in runs],
         [run.scenario.limits for run in runs],
-        [leg_words(run.scenario.leg) for run in runs],
+        [leg_words(run.scenario.leg, run.scenario.servo.armature) for run in runs],
     )
     layout.send(stream, layout.contents(room, shown, plots))
     stream.log(layout.SUMMARY, rr.TextDocument(text, media_type="text/markdown"), static=True)

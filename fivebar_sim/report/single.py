@@ -59,7 +59,7 @@ def _head(run: StoredRun) -> str:
     scenario = run.scenario
     window = scenario.window
     h = scenario.sim.timestep
-    words = leg_words(scenario.leg)
+    words = leg_words(scenario.leg, scenario.servo.armature)
     about = (
         f"The {words}{',' * (',' in words)} follows a path of kind "
         f"{scenario.path.__struct_config__.tag} in the scene {scenario.scene.kind}, driven by the "

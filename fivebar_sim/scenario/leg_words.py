@@ -27,10 +27,14 @@ MOST = 4
 """Most differences that are told; of more, the others are counted."""
 
 
-def leg_words(leg: FiveBar) -> str:
+def leg_words(leg: FiveBar, rotor: float | None = None) -> str:
     """Return "classic leg", or "classic leg, L2 = 70 mm" where it differs from its preset.
 
     A leg without a name of its own is compared with the defaults; a user's own leg is its name.
+
+    Args:
+        leg: The leg.
+        rotor: The servo's armature [kg m^2]: a leg that has it is not told to differ.
     """
     named = f"{leg.name} leg"
     preset = FiveBar()
@@ -41,6 +45,8 @@ def leg_words(leg: FiveBar) -> str:
 
     keys = [field.name for field in dataclasses.fields(FiveBar)]
     differing = [key for key in keys if getattr(leg, key) != getattr(preset, key)]
+    if leg.armature == rotor and "armature" in differing:
+        differing.remove("armature")
     told = [f"{key} = {_shown(key, getattr(leg, key))}" for key in differing[:MOST]]
     if len(differing) > MOST:
         told.append(f"and {len(differing) - MOST} more")
