@@ -47,6 +47,7 @@ UNSEEN_LENGTHS = {
     "minitaur-trot": {"L5"},
     "q8bot-squat": {"L2"},  # stands the better for it
     "q8bot-trot": {"L5"},
+    "q8bot-xl330": {"L3"},  # its rotors take far more torque than its links
 }
 UNSEEN_GAINS = {
     "airhockey-gain-schedule": {"kp_far", "kd_far"},  # 6.5 mm from the target, of 100, is near
