@@ -208,6 +208,23 @@ def test_diverging_timestep_exits_1_and_leaves_nothing(shell: Shell) -> None:
     assert "try a timestep below 0.02 s" in said
 
 
+def test_diverging_run_leaves_no_older_pass_at_its_place(shell: Shell) -> None:
+    run = ["run", "short.toml", "--quiet", "--out", "mine"]
+    before = shell.names()
+    assert shell(*run).status == 0
+    assert shell(*run, *DIVERGING).status == 1
+    assert shell.names() == before
+
+    assert shell(*run).status == 0
+    Path("mine/notes.txt").touch()
+    assert shell(*run, *DIVERGING).status == 1
+    assert shell.names() == before | {"mine", "mine/notes.txt", "mine/diverged.txt"}
+    assert "the simulation broke down at" in Path("mine/diverged.txt").read_text("utf-8")
+    assert shell(*run).status == 0
+    assert {"mine/notes.txt", "mine/metrics.json"} <= shell.names()
+    assert not Path("mine/diverged.txt").exists()
+
+
 def test_place_that_cannot_be_written_is_one_line(shell: Shell) -> None:
     Path("precious").mkdir()
     Path("precious/notes.txt").touch()

@@ -36,7 +36,8 @@ def run(
     Args:
         scenarios: Names of shipped scenarios or paths of TOML files; by default all shipped ones.
         out: Run directory of one scenario, or the folder of several (default runs/NAME);
-            an existing run's own files are replaced, what you put beside them stays.
+            an existing run's own files are replaced, or deleted if the new run diverges; what you
+            put beside them stays.
         settings: Change one key of every scenario, e.g. leg.L2=0.07 or "path.radii=[0.02, 0.01]";
             may be repeated. A new path.kind keeps the keys that both kinds have.
         live: Show the runs in a new Rerun viewer while they are simulated.
@@ -93,6 +94,7 @@ def _run(
     import json
 
     from fivebar_sim.cli import console
+    from fivebar_sim.runs import directory
 
     status = 0
     metrics = {}
@@ -105,6 +107,8 @@ def _run(
         # The other scenarios still run.
         except DivergedError as error:
             say(error)
+            # An older "pass" there would look like this run's.
+            directory.discard(place, str(error))
             status = FAILED
             continue
         metrics[name] = result.metrics

@@ -18,7 +18,7 @@ from fivebar_sim.arrays import Array
 from fivebar_sim.errors import RunDirectoryError
 from fivebar_sim.files import exchange, leftovers, whole_file
 from fivebar_sim.recording import rrd
-from fivebar_sim.runs.kept import FILES, keep
+from fivebar_sim.runs.kept import DIVERGED, FILES, keep, own_names
 
 RECORDING = "recording.rrd"
 
@@ -60,6 +60,32 @@ def write(result: rrd.Run, path: Path) -> Path:
 
     leftovers.sweep(path)
     return path
+
+
+def discard(path: Path, why: str) -> None:
+    """Delete the run at path, if any: a new one there diverged, and the old one is no evidence.
+
+    What a user has put beside its files stays, and `DIVERGED` then says why the run is gone.
+
+    Raises:
+        RunDirectoryError: It cannot be deleted.
+    """
+    try:
+        if not _is_ours(path):
+            return
+        own = own_names(path) - {DIVERGED}
+        # First, so that the place is known as a run's whenever this is interrupted.
+        (path / DIVERGED).write_text(f"{why}\n", encoding="utf-8", errors="backslashreplace")
+        for name in own:
+            (path / name).unlink(missing_ok=True)
+
+        # A link to a directory stays a link to one.
+        alone = [entry.name for entry in path.iterdir()] == [DIVERGED]
+        if alone and not path.is_symlink():
+            (path / DIVERGED).unlink()
+            path.rmdir()
+    except OSError as error:
+        raise RunDirectoryError(f"cannot delete {path}: {error.strerror or error}") from None
 
 
 def check_place(path: Path) -> None:
@@ -110,7 +136,8 @@ def _identity(path: Path) -> tuple[int, int] | None:
 
 def _is_ours(path: Path) -> bool:
     """Return whether a run was written at path; its recording can be rebuilt and may be gone."""
-    return all((path / name).is_file() for name in FILES if name != RECORDING)
+    whole = all((path / name).is_file() for name in FILES if name != RECORDING)
+    return whole or (path / DIVERGED).is_file()
 
 
 def is_run(path: Path) -> bool:

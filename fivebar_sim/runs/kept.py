@@ -17,18 +17,21 @@ FILES = ("scenario.toml", "metrics.json", "rollout.parquet", "recording.rrd")
 REPORT = "report.html"
 """The report of a run: of the old one it would be wrong beside the new one."""
 
+DIVERGED = "diverged.txt"
+"""Stands for a run that diverged, where a user's own files keep its directory."""
+
 UNLINKED = {errno.EPERM, errno.EACCES, errno.ENOTSUP, errno.EXDEV, errno.EMLINK, errno.ENOSYS}
 """Errors of file systems that cannot give a file a second name."""
 
 
 def own_names(path: Path) -> set[str]:
-    """Return the names of a run's own files: `FILES`, the files of its scenario, its report."""
+    """Return the names of a run's own files: `FILES`, its scenario's, its report, `DIVERGED`."""
     try:
         inputs = list(Scenario.load(path / "scenario.toml").files)
     # Its controller may be gone: then its inputs stay, which harms nobody.
     except FiveBarError:
         inputs = []
-    return {*FILES, *inputs, REPORT}
+    return {*FILES, *inputs, REPORT, DIVERGED}
 
 
 def keep(path: Path, stage: Path) -> None:
