@@ -188,7 +188,7 @@ BUSES = st.builds(Servo, rate=RATES, delay=DELAYS, resolution=st.sampled_from([0
 @given(servo=BUSES, timestep=TIMESTEPS, count=st.integers(0, 300))
 def test_commands_arrive_late_and_hold(servo: Servo, timestep: float, count: int) -> None:
     row = servo.latched(count, timestep)
-    late = round(servo.delay / timestep)
+    late = math.floor(servo.delay / timestep + 1e-6)
     hold = 1 if servo.rate is None else max(1, round(1.0 / (servo.rate * timestep)))
     assert row.shape == (count,)
     for k in range(count):  # by hand: the last that was sent `late` steps ago or before
@@ -218,10 +218,23 @@ def test_what_is_sent_is_causal(servo: Servo, timestep: float, seed: int, k: int
     np.testing.assert_array_equal(one[:, :k], other[:, :k])
     np.testing.assert_array_equal(one[1], carried(servo, table[1:2], rest[1:2], timestep)[0])
     raw = carried(servo, table, rest, timestep, "torque")
-    row = servo.latched(80, timestep)
-    np.testing.assert_array_equal(one, servo.rounded(raw))  # torques are not
-    for j in range(80):
-        np.testing.assert_array_equal(raw[:, j], rest if row[j] < 0 else table[:, row[j]])
+    rounded = (servo.rounded(table), servo.rounded(rest))
+    for got, (sent, held) in ((raw, (table, rest)), (one, rounded)):  # torques are not rounded
+        new, old = (
+            np.stack([held if row < 0 else sent[:, row] for row in rows], axis=1)
+            for rows in (servo.latched(80, timestep), servo.latched(80, timestep, 1))
+        )
+        part = servo.delay / timestep - math.floor(servo.delay / timestep + 1e-6)
+        np.testing.assert_allclose(got, new + part * (old - new), atol=1e-5)
+
+
+@pytest.mark.parametrize("drive", ["position", "torque"])
+def test_a_delay_within_a_step_is_no_whole_step(drive: Drive) -> None:
+    """A ramp that comes 0.3 steps late is 0.3 steps of it behind."""
+    ramp = np.tile(np.arange(9.0)[:, None], (1, 1, 2))
+    for delay, behind in [(0.3e-3, 0.3), (2.7e-3, 2.7), (3e-3, 3.0)]:
+        got = carried(Servo(delay=delay), ramp, np.zeros((1, 2)), 1e-3, drive)
+        np.testing.assert_allclose(got[0, 4:], ramp[0, 4:] - behind, atol=1e-12)
 
 
 @given(theta=st.floats(-10.0, 10.0), resolution=st.floats(1e-4, 1.0))

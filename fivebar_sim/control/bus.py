@@ -18,7 +18,8 @@ class Bus:
     """Commands on their way to the servos: delayed, sent at the bus's rate, rounded.
 
     One command is given every `every` timesteps, and `Servo.latched` says which of them acts.
-    Angles are rounded to what can be commanded; torques are not.
+    Angles are rounded to what can be commanded; torques are not. Where a delay ends within a step,
+    the step gets the mean of the command before and the one after, by the time that each acts.
 
     Args:
         servos: One for each leg; they may differ only in gains, rate and delay.
@@ -44,11 +45,15 @@ class Bus:
         numbers = {kind: number for number, kind in enumerate(kinds)}
         self._kind = np.array([numbers[servo.rate, servo.delay] for servo in servos])
         latched = np.stack([servo.latched(steps, timestep) for servo in kinds.values()])
+        older = np.stack([servo.latched(steps, timestep, 1) for servo in kinds.values()])
         # The control period whose command acts in each step; -1 before the first arrives.
         self._period = latched // every
+        self._older = older // every
+        self._part = np.array([servo.late(steps, timestep)[1] for servo in kinds.values()])
 
         # If every command acts at once and until the next one, none needs to be stored.
-        self._prompt = bool((self._period == np.arange(steps) // every).all())
+        at_once = bool((self._period == np.arange(steps) // every).all())
+        self._prompt = at_once and not self._part.any()
         periods = 0 if self._prompt else -(-steps // every)
         self._commands = np.zeros((len(servos), periods, 2))
 
@@ -75,7 +80,7 @@ class Bus:
 
         at = np.broadcast_to(k, len(command))
         self._commands[self._legs, at // self._every] = command
-        return self._look_up(self._period[self._kind[:, None], at[:, None] + np.arange(n)])
+        return self._look_up(at[:, None] + np.arange(n))
 
     def send_all(self, commands: Array) -> Array:
         """Return the commands that act in each step of the run, (nsim, N, 2).
@@ -84,9 +89,20 @@ class Bus:
             commands: The commands of all control periods [rad or N m], (nsim, periods, 2).
         """
         self._commands = commands
-        return self._look_up(self._period[self._kind])
+        return self._look_up(np.arange(self._steps)[None])
 
-    def _look_up(self, period: NDArray[np.int64]) -> Array:
+    def _look_up(self, k: NDArray[np.int64]) -> Array:
+        """Return the commands that act in some steps, (nsim, n, 2)."""
+        kind = self._kind[:, None]
+        acting = self._of(self._period[kind, k])
+        part = self._part[self._kind][:, None, None]
+        if not part.any():
+            return acting
+        older = self._of(self._older[kind, k])
+        # Legs whose delay is whole keep their bits beside others.
+        return np.where(part > 0.0, acting + part * (older - acting), acting)
+
+    def _of(self, period: NDArray[np.int64]) -> Array:
         """Return the commands of control periods (nsim, n); in period -1 the one at rest."""
         # Index -1 reads the last command, a legal place; the next line throws it away.
         sent = self._commands[self._legs[:, None], period]

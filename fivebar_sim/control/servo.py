@@ -145,18 +145,28 @@ class Servo(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
                 f"of {timestep:g} s, got {self.rate!r}"
             )
 
-    def latched(self, steps: int, timestep: float) -> NDArray[np.int64]:
+    def late(self, steps: int, timestep: float) -> tuple[int, float]:
+        """Return the whole timesteps in the delay, at most `steps`, and the part of one beyond."""
+        part = min(self.delay / timestep, steps)
+        # Decimals are rounded as floats: 0.003 / 0.001 is 3 to a part in a million.
+        if abs(part - round(part)) < 1e-6:
+            return round(part), 0.0
+        return int(part), part - int(part)
+
+    def latched(self, steps: int, timestep: float, more: int = 0) -> NDArray[np.int64]:
         """Return which row of a table of commands acts in each step, (N,); -1 before the first.
 
-        With n steps a command and d steps of delay, both rounded to the nearest and n >= 1,
+        With n steps a command, rounded to the nearest and n >= 1, and d steps of delay,
 
             row(k) = n floor((k - d) / n)   for k >= d, else -1
 
-        so that row(k) <= k: a table may grow while it is used.
+        so that row(k) <= k: a table may grow while it is used. Where the delay is no whole number
+        of timesteps, this is the row that acts at a step's end.
 
         Args:
             steps: N.
             timestep: h [s].
+            more: Steps of delay on top; with 1 the row that acts at a step's start.
 
         Raises:
             ArgumentError: Unless 0 < h, and rate <= 1 / h: no command acts for part of a step.
@@ -167,8 +177,7 @@ class Servo(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
             part = self.rate * timestep  # of a command in one step
             hold = max(1, round(1.0 / part) if part * steps > 1.0 else steps)
 
-        late = round(min(self.delay / timestep, steps))
-        since = np.arange(steps) - late
+        since = np.arange(steps) - self.late(steps, timestep)[0] - more
         return np.where(since < 0, -1, since // hold * hold)
 
     def rounded(self, theta: Array) -> Array:

@@ -154,7 +154,7 @@ def refined(scenario: Scenario, parts: int, integrator: Integrator) -> Scenario:
     sensors = scenario.sensors
     return msgspec.structs.replace(
         scenario,
-        servo=msgspec.structs.replace(servo, delay=_whole(servo.delay, h)),
+        servo=servo,
         sensors=msgspec.structs.replace(sensors, delay=_whole(sensors.delay, h)),
         sim=msgspec.structs.replace(scenario.sim, timestep=h / parts, integrator=integrator),
     )
