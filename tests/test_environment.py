@@ -73,7 +73,7 @@ class TestGait(Conformance, absltest.TestCase):
 
 
 @pytest.mark.parametrize("kind", ["track", "hop", "stand"])
-@pytest.mark.parametrize("settings", [(), ("servo.delay=0.007", "servo.rate=333.0")])
+@pytest.mark.parametrize("settings", [(), ("servo.delay=0.007", "servo.rate=250.0")])
 def test_states_are_the_scenarios(kind: str, settings: tuple[str, ...]) -> None:
     wanted = scenario(kind, *settings)
     task = task_of(kind, wanted)

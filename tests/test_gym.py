@@ -95,7 +95,7 @@ def test_a_later_episode_is_as_the_first(kind: str) -> None:
     "settings",
     [
         (),
-        ("servo.delay=0.007", "servo.rate=333.0", "servo.resolution=0.01"),
+        ("servo.delay=0.007", "servo.rate=250.0", "servo.resolution=0.01"),
         ("sim.timestep=0.0005", "sim.integrator=implicitfast", "servo.limit=0.6"),
     ],
 )

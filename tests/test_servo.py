@@ -20,6 +20,7 @@ from fivebar_sim.files import resources
 from fivebar_sim.geometry import FiveBar
 from fivebar_sim.integrator import Integrator
 from fivebar_sim.paths import Ellipse
+from fivebar_sim.scenario import Scenario
 from fivebar_sim.simulation.steps import Legs
 
 H = 1e-3
@@ -308,6 +309,14 @@ def test_refusal_of_a_bus_faster_than_the_steps() -> None:
     Servo(rate=1000.0).check_rate(H)
     with pytest.raises(ArgumentError, match="timestep must be in"):
         Servo().latched(10, math.nan)
+
+
+def test_refusal_of_a_rate_that_would_be_rounded() -> None:
+    message = r"rate must be 1 / \(a whole number of timesteps of 0\.001 s\), here 1000 or 500 Hz"
+    with pytest.raises(ConfigError, match="servo." + message):
+        Scenario.load("classic-ellipse", ["servo.rate=667.0"])
+    for rate in (1000.0, 500.0, 333.33333, 50.0, 1e-300):
+        Servo(rate=rate).check_whole(H)
 
 
 def test_refusal_names_file_and_key(tmp_path: Path) -> None:

@@ -145,6 +145,27 @@ class Servo(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
                 f"of {timestep:g} s, got {self.rate!r}"
             )
 
+    def check_whole(self, timestep: float) -> None:
+        """Raise unless a command comes every whole number of timesteps.
+
+        Args:
+            timestep: h [s].
+
+        Raises:
+            ArgumentError: Another rate would be rounded to one of these.
+        """
+        if self.rate is None:
+            return
+        # Beyond a million steps a command, rounding is less than a part in a million.
+        steps = min(1.0 / max(self.rate * timestep, 1e-6), 1e6)
+        whole = round(steps)
+        if abs(steps - whole) > 1e-5 * steps:
+            near = " or ".join(f"{1.0 / (n * timestep):.7g}" for n in (int(steps), int(steps) + 1))
+            raise ArgumentError(
+                f"rate must be 1 / (a whole number of timesteps of {timestep:g} s), here {near} "
+                f"Hz, got {self.rate!r}"
+            )
+
     def late(self, steps: int, timestep: float) -> tuple[int, float]:
         """Return the whole timesteps in the delay, at most `steps`, and the part of one beyond."""
         part = min(self.delay / timestep, steps)

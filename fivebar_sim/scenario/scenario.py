@@ -307,9 +307,10 @@ def _check_window(scenario: Scenario, where: str) -> None:
     if force is not None and not scenario.steps * h <= force.end * (1.0 + 1e-9):
         raise ConfigError(f"{where}: duration must be at most the force's {force.end:g} s, {came}")
 
-    # Asked only for its check: a bus faster than the timestep is refused.
+    # Asked only for their checks: no bus is faster than the timestep, or rounded to another one.
     try:
         scenario.servo.check_rate(h)
+        scenario.servo.check_whole(h)
     except ArgumentError as error:
         raise ConfigError(f"{where}: servo.{error}") from None
 
