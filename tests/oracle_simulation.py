@@ -25,9 +25,9 @@ Law = Callable[[Leg, Path, float, Pair, Pair], Pair]
 
 @dataclass(frozen=True, slots=True)
 class Servo:
-    """A position servo in continuous time; only the stiffness term meets the torque limit.
+    """A position servo in continuous time; the torque limit clips spring and damper together.
 
-        tau = clip(kp (u - theta), -limit, limit) - kd theta_dot
+        tau = clip(kp (u - theta) - kd theta_dot, -limit, limit)
         u = theta_ref                                                       feedforward "none"
         u = theta_ref + (kd / kp) theta_dot_ref                             "velocity"
         u = theta_ref + (kd / kp) theta_dot_ref + tau_ref / kp              "dynamics"
@@ -66,7 +66,7 @@ class Servo:
         tau = []
         for ref, extra, q, q_dot in zip((psi[0], psi[3]), ahead, theta, theta_dot, strict=True):
             pull = self.kp * math.remainder(ref - q, 2.0 * math.pi) + extra
-            tau.append(min(max(pull, -self.limit), self.limit) - self.kd * q_dot)
+            tau.append(min(max(pull - self.kd * q_dot, -self.limit), self.limit))
         return tau
 
 

@@ -70,7 +70,7 @@ def test_shipped_scenarios_pass_their_baselines_whole(shell: Shell) -> None:
         ("servo.kd=0.055", "tracking RMS"),
         ("servo.kp=7.2", "tracking RMS"),
         ("servo.delay=0.001", "tracking RMS"),
-        ("servo.limit=0.008", "motor A saturated"),
+        ("servo.limit=0.00283", "motor A saturated"),
         ("leg.L1=0.0404", "torque A RMS"),
         ("leg.L4=0.0396", "torque E RMS"),
         ("leg.L2=0.0606", "torque A RMS"),

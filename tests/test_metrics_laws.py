@@ -151,7 +151,8 @@ def test_phase_and_stance_are_those_of_when_the_steps_began(rng: np.random.Gener
         phase = None if path.period is None else np.round(path.cycle(began), 9) % 1.0
         wanted = load.measure(torque[window], turned, H, stance=stance, phase=phase)
         found = measured(scenario, record)["load"]
-        assert {**wanted, "saturated": {"A": 0.0, "E": 0.0}} == found
+        assert found.pop("saturated") == {"A": 0.0, "E": 0.0}
+        assert {key: found[key] for key in wanted} == wanted
         assert ("stance" in found, "phase" in found) == (scenario is STEPS, scenario is not ONCE)
 
 

@@ -13,6 +13,7 @@ from judged import PROVENANCE, judged
 
 from fivebar_sim import metrics
 from fivebar_sim.metrics.catalogue import ABSOLUTE, LESS_IS_BETTER, SHOWN
+from fivebar_sim.metrics.columns import Record
 from fivebar_sim.metrics.guards import Guard
 from fivebar_sim.regression import baseline, comparison
 from fivebar_sim.regression.baseline import RELATIVE, Baseline, Recorded
@@ -22,7 +23,7 @@ from fivebar_sim.scenario import Scenario
 SCENARIO = Scenario.load("rail-hop")
 KEYS = sorted(ABSOLUTE)
 COLUMNS = ("foot_x", "foot_z", "target_x", "target_z")
-AT_REST = dict.fromkeys(COLUMNS, np.zeros(SCENARIO.steps))
+AT_REST: Record = {name: np.zeros(SCENARIO.steps) for name in COLUMNS}
 """What a result's warnings look at."""
 
 

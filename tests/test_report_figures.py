@@ -298,7 +298,7 @@ def test_overlaid_torques_are_scaled_by_the_windows(ellipse: StoredRun, landing:
     measured = 1e3 * np.abs(landing.record["torque_A"][window]).max()
     assert measured < ax.get_ylim()[1] < 1.2 * measured
     assert axes.CUT in drawn["torque"].caption
-    assert "1128" in [text.get_text() for text in ax.texts]
+    assert "1129" in [text.get_text() for text in ax.texts]
     assert axes.CUT not in drawn["ground"].caption
     assert drawn["ground"].figure.axes[0].get_ylim()[1] > landing.record["ground_z"].max()
 

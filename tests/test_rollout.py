@@ -118,15 +118,15 @@ def test_setpoint_timing_is_the_better_one(integrator: str) -> None:
 
 def test_saturation_against_the_oracle() -> None:
     """With a limit below what the motion needs the leg falls behind, as the oracle's does."""
-    limit = 0.004
+    limit = 0.00283
     result = ellipse(f"servo.limit={limit}", "duration=0.75")
     law = oracle_simulation.Servo(kp=8.0, kd=0.05, limit=limit)
     path = oracle_simulation.eased_ellipse((0.0, -0.072), (0.020, 0.008), 2.0, 0.25)
     true = oracle_simulation.simulate(
         oracle.Leg.of(result.scenario.leg), law, path, 0.75, result.record["time"]
     )
-    clipped = np.abs(8.0 * (column_pair(result, "ctrl") - true.theta)) > limit
-    assert 0.3 < clipped.mean() <= 1.0
+    clipped = np.abs(column_pair(result, "torque")) > limit * (1.0 - 1e-9)
+    assert 0.02 < clipped.mean() <= 1.0
     assert np.linalg.norm(foot(result) - true.foot, axis=-1).max() < 0.02 * 0.020
 
 

@@ -190,7 +190,7 @@ def test_path_out_of_reach_names_the_nearest_point_of_its_own_mode() -> None:
     assert workspace.reachable(BENT, lost)
     out = -workspace.distance(BENT, lost, mode=BENT.mode)
     assert out > 0.0
-    assert f"is {units.text(1e3 * out, 'mm', 3)} out" in str(error.value)
+    assert f"is {units.text(1e3 * float(out), 'mm', 3)} out" in str(error.value)
 
 
 # refusal

@@ -233,7 +233,7 @@ CATALOGUE = (
     ),
     Metric(
         key="ground.rail_end_max",
-        label="rail's end force max",
+        label="rail's end force",
         scale=1.0,
         unit="N",
         tolerance=1e-3,

@@ -54,6 +54,7 @@ def kinds() -> dict[str, type[FootPath]]:
     for name, entry in installed(GROUP, "path").items():
         if name in KINDS:
             raise ConfigError(f"path {name!r} of {entry.value} has the name of a shipped kind")
+
         kind = load(entry, "path")
         if not (isinstance(kind, type) and issubclass(kind, FootPath)):
             raise ConfigError(f"path {name!r}: {entry.value} must be a FootPath, got {kind!r}")
@@ -62,5 +63,6 @@ def kinds() -> dict[str, type[FootPath]]:
                 f"path {name!r}: {entry.value} must have its name as tag, got "
                 f"{kind.__struct_config__.tag!r}"
             )
+
         found[name] = kind
     return found
