@@ -169,12 +169,12 @@ def test_at_rest_the_servo_sags_by_statics() -> None:
 # --- edge ---
 
 
-def test_only_the_stiffness_term_is_limited() -> None:
+def test_spring_and_damper_are_limited_together() -> None:
     servo = replace(PLAIN, limit=0.1)
     psi = oracle.pose(CLASSIC, -0.07j)
     theta = (psi[0] - 1.0, psi[3] + 1.0)
-    tau = servo(CLASSIC, held(0.0, -0.07), 0.0, theta, (10.0, 2.0))
-    np.testing.assert_allclose(tau, (0.1 - 0.5, -0.1 - 0.1), rtol=1e-14)
+    tau = servo(CLASSIC, held(0.0, -0.07), 0.0, theta, (159.0, 2.0))
+    np.testing.assert_allclose(tau, (8.0 - 7.95, -0.1), rtol=1e-12)
 
 
 def test_servo_does_not_care_for_whole_turns() -> None:
