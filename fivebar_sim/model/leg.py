@@ -112,24 +112,13 @@ def leg_spec(
 
         trunk.add_frame(pos=(0.1, 0, 0)).attach_body(leg_spec(leg).body("hip"), "FL_", "")
     """
-    if integrator not in get_args(Integrator):
-        raise ArgumentError(unknown("integrator", str(integrator), get_args(Integrator)))
     if drive not in get_args(Drive):
         raise ArgumentError(unknown("drive", str(drive), get_args(Drive)))
 
     file = "leg.xml" if scene is None else f"scenes/{scene.kind}.xml"
     with quiet():
         spec = mujoco.MjSpec.from_file(str(resources.folder("models") / file))
-
-    if timestep is not None:
-        if not 0.0 < timestep < np.inf:
-            raise ArgumentError(f"timestep must be in (0, inf) s, got {timestep!r}")
-        spec.option.timestep = timestep
-
-    spec.option.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{integrator.upper()}")
-    gx, gz = leg.gravity
-    # MuJoCo is three-dimensional: the leg moves in its xz-plane, y points away.
-    spec.option.gravity = (gx, 0.0, gz)
+    set_options(spec, leg, timestep, integrator)
 
     # The model is compiled in this pose: a closed one, far from every singularity.
     q = kinematics.hanging(leg) if isinstance(scene, Ground) else kinematics.home(leg)
@@ -146,6 +135,27 @@ def leg_spec(
     elif isinstance(scene, Ground):
         _stand(spec, leg, scene, q)
     return spec
+
+
+def set_options(
+    spec: mujoco.MjSpec, leg: FiveBar, timestep: float | None, integrator: Integrator
+) -> None:
+    """Set timestep, integrator and gravity of a spec; what is attached to it keeps none of its own.
+
+    Raises:
+        ArgumentError: Unknown integrator, or a timestep that is not positive.
+    """
+    if integrator not in get_args(Integrator):
+        raise ArgumentError(unknown("integrator", str(integrator), get_args(Integrator)))
+    if timestep is not None:
+        if not 0.0 < timestep < np.inf:
+            raise ArgumentError(f"timestep must be in (0, inf) s, got {timestep!r}")
+        spec.option.timestep = timestep
+
+    spec.option.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{integrator.upper()}")
+    gx, gz = leg.gravity
+    # MuJoCo is three-dimensional: the leg moves in its xz-plane, y points away.
+    spec.option.gravity = (gx, 0.0, gz)
 
 
 def _lower(spec: mujoco.MjSpec) -> None:

@@ -1,0 +1,14 @@
+"""Legs and robots as MuJoCo models."""
+
+from fivebar_sim.integrator import Integrator
+from fivebar_sim.model.leg import HIP_HEIGHT, build, leg_spec, quiet, standing, without_log
+
+__all__ = [
+    "HIP_HEIGHT",
+    "Integrator",
+    "build",
+    "leg_spec",
+    "quiet",
+    "standing",
+    "without_log",
+]
