@@ -22,6 +22,7 @@ LEVELS = (
     "metrics motion",
     "control",
     "scenario fivebar_controllers",
+    "robots",
     "model",
     "render simulation",
     "recording tasks",

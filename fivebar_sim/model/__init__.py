@@ -2,11 +2,13 @@
 
 from fivebar_sim.integrator import Integrator
 from fivebar_sim.model.leg import HIP_HEIGHT, build, leg_spec, quiet, standing, without_log
+from fivebar_sim.model.robot import build_robot
 
 __all__ = [
     "HIP_HEIGHT",
     "Integrator",
     "build",
+    "build_robot",
     "leg_spec",
     "quiet",
     "standing",

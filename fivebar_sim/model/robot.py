@@ -1,0 +1,156 @@
+"""A robot as a MuJoCo model: a trunk, and the same leg four times.
+
+The structure lives in models/robots/ and models/leg.xml; nothing here rebuilds it.
+"""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+
+from fivebar_sim import kinematics
+from fivebar_sim.arrays import Array
+from fivebar_sim.control.servo import Drive
+from fivebar_sim.errors import GeometryError
+from fivebar_sim.files import resources
+from fivebar_sim.integrator import Integrator
+from fivebar_sim.model.leg import HIP_HEIGHT, leg_spec, quiet, set_options, standing
+from fivebar_sim.robots import LEGS, Floor, Robot, Scene
+
+BACKWARD = (0.0, 0.0, 0.0, 1.0)
+"""Half a turn about z, as a quaternion."""
+
+NET_FORCE = (3, 3, 1)
+"""A contact sensor's parameters for "found force", "netforce", one contact."""
+
+
+def build_robot(
+    robot: Robot,
+    scene: Scene | None = None,
+    *,
+    timestep: float | None = None,
+    integrator: Integrator = "discrete",
+    drive: Drive = "position",
+) -> mujoco.MjModel:
+    """Return the compiled model of a robot, its loops closed in the legs' rest pose.
+
+    On a floor qpos begins with the trunk's position (3) and quaternion (4). Then come (theta_A,
+    theta_B, theta_E, theta_D) of FL, FR, RL and RR; ctrl is (A, E) of each. Names are those of a
+    leg with the leg's name in front, `FL_A`; `trunk` is the body between them, and `FL_ground` the
+    force of the floor on a foot, along the world's axes, after a number that says whether there is
+    any. The keyframe is `home`, in the air, or `stand`, with the lowest foot on the floor.
+
+    Args:
+        robot: The robot.
+        scene: What it stands on; None: a floor with its defaults.
+        timestep: [s]; None: the one in the MJCF file.
+        integrator: "discrete" or "implicitfast".
+        drive: Whether ctrl is an angle or a torque.
+
+    Raises:
+        ArgumentError: Unknown integrator or drive, or a timestep that is not positive.
+        GeometryError: The legs do not reach below the trunk, or MuJoCo cannot compile them.
+    """
+    scene = Floor() if scene is None else scene
+    q = kinematics.hanging(robot.leg)
+    with quiet():
+        file = resources.folder("models") / "robots" / f"{scene.kind}.xml"
+        spec = mujoco.MjSpec.from_file(str(file))
+
+        set_options(spec, robot.leg, timestep, integrator)
+        _weigh(spec, robot)
+        for name in LEGS:
+            leg = leg_spec(
+                robot.leg,
+                servo=robot.servo,
+                timestep=timestep,
+                integrator=integrator,
+                drive=drive,
+            )
+            _attach(spec, leg, robot, name, scene)
+
+        _place(spec, robot, scene, q)
+        _rest(spec, robot, scene, q, drive)
+        try:
+            return spec.compile()
+        except ValueError as error:
+            # MuJoCo's messages span lines; ours are one line.
+            message = " ".join(str(error).split())
+            raise GeometryError(f"MuJoCo refuses robot {robot.name!r}: {message}") from None
+
+
+def standing_height(robot: Robot, q: Array) -> float:
+    """Return the trunk's height above the floor with the lowest foot just on it [m].
+
+    Args:
+        robot: The robot, level.
+        q: Joint angles of its legs [rad], (4,) for all or (4, 4) in the order of `LEGS`.
+
+    Raises:
+        GeometryError: A foot is not below its hip.
+    """
+    poses = np.broadcast_to(q, (len(LEGS), 4))
+    heights = [
+        standing(robot.leg, pose) - robot.hips[name].pos[2]
+        for name, pose in zip(LEGS, poses, strict=True)
+    ]
+    return max(heights)
+
+
+def _weigh(spec: mujoco.MjSpec, robot: Robot) -> None:
+    """Give the trunk its size and its inertia."""
+    trunk = robot.trunk
+    body = spec.body("trunk")
+    body.explicitinertial = True
+    body.mass = robot.trunk_mass
+    body.ipos = trunk.center
+    body.inertia = trunk.inertia_of(robot.trunk_mass)
+    box = spec.geom("trunk")
+    box.pos = trunk.center
+    box.size = 0.5 * np.array(trunk.size)
+
+
+def _attach(spec: mujoco.MjSpec, leg: mujoco.MjSpec, robot: Robot, name: str, scene: Scene) -> None:
+    """Fix a leg to the trunk, and measure the floor's force on its foot."""
+    hip = robot.hips[name]
+    frame = spec.body("trunk").add_frame(pos=hip.pos)
+    if hip.mirrored:
+        frame.quat = BACKWARD
+    if isinstance(scene, Floor):
+        leg.geom("foot").friction[0] = scene.friction
+    frame.attach_body(leg.body("hip"), f"{name}_", "")
+
+    # As in the leg's own scenes: found, then the force over the step that led to the state.
+    spec.add_sensor(
+        name=f"{name}_ground",
+        type=mujoco.mjtSensor.mjSENS_CONTACT,
+        objtype=mujoco.mjtObj.mjOBJ_GEOM,
+        objname="floor",
+        reftype=mujoco.mjtObj.mjOBJ_GEOM,
+        refname=f"{name}_foot",
+        intprm=NET_FORCE,
+    )
+
+
+def _place(spec: mujoco.MjSpec, robot: Robot, scene: Scene, q: Array) -> None:
+    """Put the trunk where the lowest foot stands, or out of the reach of every foot."""
+    lowest = min(hip.pos[2] for hip in robot.hips.values())
+    height = HIP_HEIGHT * robot.leg.size - lowest
+    if isinstance(scene, Floor):
+        height = standing_height(robot, q)
+    spec.body("trunk").pos = (0.0, 0.0, height)
+
+
+def _rest(spec: mujoco.MjSpec, robot: Robot, scene: Scene, q: Array, drive: Drive) -> None:
+    """Replace the legs' keyframes by one of the robot."""
+    for key in list(spec.keys):
+        spec.delete(key)
+
+    free = isinstance(scene, Floor)
+    trunk = [*spec.body("trunk").pos, 1.0, 0.0, 0.0, 0.0] if free else []
+    ctrl = q[[0, 2]] if drive == "position" else np.zeros(2)
+    spec.add_key(
+        name="stand" if free else "home",
+        qpos=np.concatenate([trunk, np.tile(q, len(LEGS))]),
+        ctrl=np.tile(ctrl, len(LEGS)),
+    )

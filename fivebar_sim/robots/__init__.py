@@ -1,0 +1,6 @@
+"""Robots as data: a trunk, four hips, a leg, a servo. The shipped ones are in models/robots/."""
+
+from fivebar_sim.robots.floor import Air, Floor, Scene
+from fivebar_sim.robots.robot import LEGS, Hip, Robot, Trunk
+
+__all__ = ["LEGS", "Air", "Floor", "Hip", "Robot", "Scene", "Trunk"]

@@ -1,0 +1,207 @@
+"""A quadruped of four equal five-bar legs, in numbers.
+
+FL -- FR
+|  ^x  |     x forward, y left, z up, from wherever the file measures; each leg moves in a plane
+RL -- RR     parallel to x-z.
+"""
+
+from __future__ import annotations
+
+import math
+from itertools import combinations
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from fivebar_sim.checks import check_number
+from fivebar_sim.control.servo import Servo
+from fivebar_sim.errors import ArgumentError, ConfigError
+from fivebar_sim.files import presets, tables
+from fivebar_sim.files.tables import Table
+from fivebar_sim.geometry import HEAVIEST, LONGEST, FiveBar
+from fivebar_sim.scenario import reading
+
+LEGS = ("FL", "FR", "RL", "RR")
+"""The legs, in the order of a robot's joints and motors: front left, front right, rear left, rear
+right."""
+
+KEYS = ("name", "leg", "servo", "mass", "trunk", "hips")
+
+Vector = tuple[float, float, float]
+
+
+class Trunk(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """The body between the legs, with everything that moves with it.
+
+    Attributes:
+        size: Length, width and height of its box [m].
+        center: Middle of the box in the trunk's frame [m]; also the centre of mass.
+        inertia: About the centre of mass, along x, y and z [kg m^2]; None: that of a box of even
+            density.
+    """
+
+    size: Vector
+    center: Vector = (0.0, 0.0, 0.0)
+    inertia: Vector | None = None
+
+    def __post_init__(self) -> None:
+        for value in self.size:
+            check_number("size", value, "m", low=0.0, high=LONGEST, strict=True)
+        for value in self.center:
+            check_number("center", value, "m", low=-LONGEST, high=LONGEST)
+
+        if self.inertia is None:
+            return
+
+        for value in self.inertia:
+            check_number("inertia", value, "kg m^2", low=0.0, high=HEAVIEST, strict=True)
+        if 2.0 * max(self.inertia) > sum(self.inertia):
+            raise ArgumentError(
+                "inertia: no body has a moment of inertia greater than the sum of the other two, "
+                f"got {list(self.inertia)} kg m^2"
+            )
+
+    def inertia_of(self, mass: float) -> Vector:
+        """Return the moments of inertia of a trunk of a mass [kg], along x, y, z [kg m^2].
+
+        Ix = m (w^2 + h^2) / 12,   Iy = m (l^2 + h^2) / 12,   Iz = m (l^2 + w^2) / 12
+
+        Args:
+            mass: m [kg].
+        """
+        if self.inertia is not None:
+            return self.inertia
+        length, width, height = (side**2 for side in self.size)
+        part = mass / 12.0
+        return part * (width + height), part * (length + height), part * (length + width)
+
+
+class Hip(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """Where a leg is fixed to the trunk.
+
+    Attributes:
+        pos: Origin of the leg's hip frame, midway between A and E, in the trunk's frame [m].
+        mirrored: Whether the leg is turned by half a turn about z: its x points backward.
+    """
+
+    pos: Vector
+    mirrored: bool = False
+
+    def __post_init__(self) -> None:
+        for value in self.pos:
+            check_number("pos", value, "m", low=-LONGEST, high=LONGEST)
+
+
+class Robot(msgspec.Struct, frozen=True, kw_only=True):
+    """A robot with four legs, in m and kg.
+
+    Attributes:
+        name: Name in tables and pictures.
+        leg: Each of its legs; with the servo's rotor inertia, where the servo has one.
+        servo: Each of its eight servos.
+        mass: The whole robot, legs included [kg].
+        trunk: The body between the legs.
+        hips: Where each of the legs `LEGS` is.
+    """
+
+    name: str
+    leg: FiveBar
+    servo: Servo
+    mass: float
+    trunk: Trunk
+    hips: dict[str, Hip]
+
+    def __post_init__(self) -> None:
+        check_number("mass", self.mass, "kg", low=0.0, high=HEAVIEST, strict=True)
+        legs = self.mass - self.trunk_mass
+
+        if not self.trunk_mass > 0.0:
+            raise ArgumentError(
+                f"mass must be in ({legs:g}, {HEAVIEST:g}] kg, more than that of the four legs, "
+                f"got {self.mass!r}"
+            )
+        self._check_apart()
+
+    def _check_apart(self) -> None:
+        """Raise if two legs are in the same place."""
+        # Links are as thick as they are wide; the motors' axes take L5 between them.
+        thick = 2.0 * max(self.leg.radius, self.leg.foot_radius)
+        wide = self.leg.L5 + thick
+        for one, other in combinations(LEGS, 2):
+            pairs = zip(self.hips[one].pos, self.hips[other].pos, strict=True)
+            x, y, z = (abs(a - b) for a, b in pairs)
+            if y < thick and math.hypot(x, z) < wide:
+                raise ArgumentError(
+                    f"hips.{other} is inside hips.{one}: they must be {thick:g} m apart along y, "
+                    f"or {wide:g} m in the leg's plane, got {y:g} m and {math.hypot(x, z):g} m"
+                )
+
+    @property
+    def trunk_mass(self) -> float:
+        """The mass of the trunk: what the legs leave [kg]."""
+        return self.mass - 4.0 * sum(link.mass for link in self.leg.links)
+
+    @property
+    def length(self) -> float:
+        """Length of the trunk's box [m]: what speeds in body lengths are measured by."""
+        return self.trunk.size[0]
+
+    @classmethod
+    def load(cls, source: str | Path) -> Robot:
+        """Return the robot of a preset ("q8bot") or of a TOML file.
+
+        Leg and servo are presets by name, TOML files beside the robot's, or tables with changes, as
+        in a scenario.
+
+        Raises:
+            ConfigError: Unknown preset, unreadable file, unknown key, or a value out of range.
+        """
+        path = presets.find(source, "robot")
+        table = {"name": path.stem, **presets.read(source, "robot")}
+        return cls.from_table(table, str(source), path.parent)
+
+    @classmethod
+    def from_table(cls, table: Table, where: str, folder: Path) -> Robot:
+        """Return the robot of a TOML table; `where` names it in messages, files are in `folder`.
+
+        Raises:
+            ConfigError: An unknown or missing key, or a value out of range; names the key.
+        """
+        tables.check_keys(table, KEYS, where)
+        tables.check_finite(table, where)
+        for key in KEYS:
+            if key not in table:
+                raise ConfigError(f"{where}: {key} is missing")
+
+        servo = reading.servo(table["servo"], where, folder)
+        try:
+            # Numbers are checked here, by name, and not by msgspec: the Struct's own table would
+            # be the leg spelt out.
+            return cls(
+                name=_printable(table["name"], where),
+                leg=reading.leg(table["leg"], where, folder, servo.armature),
+                servo=servo,
+                mass=table["mass"],
+                trunk=tables.convert(table["trunk"], Trunk, "trunk", where),
+                hips=_hips(table["hips"], where),
+            )
+        except ArgumentError as error:
+            raise ConfigError(f"{where}: {error}") from None
+
+
+def _printable(name: Any, where: str) -> str:
+    if not isinstance(name, str) or not name.isprintable() or not name:
+        raise ConfigError(f"{where}: name must be a printable string, got {name!r}")
+    return name
+
+
+def _hips(table: Any, where: str) -> dict[str, Hip]:
+    """Return the four hips of a table [hips]."""
+    if not isinstance(table, dict):
+        raise ConfigError(f"{where}: hips must be a table, got {table!r}")
+    tables.check_keys(table, LEGS, f"{where}: [hips]")
+    for leg in LEGS:
+        if leg not in table:
+            raise ConfigError(f"{where}: hips.{leg} is missing")
+    return {leg: tables.convert(table[leg], Hip, f"hips.{leg}", where) for leg in LEGS}
