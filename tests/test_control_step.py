@@ -187,6 +187,22 @@ def test_last_period_is_cut_off() -> None:
     assert control.send(7, np.ones((1, 2))).shape == (1, 3, 2)
 
 
+@given(late=st.integers(0, 30), part=st.floats(0.01, 0.99), every=st.integers(1, 7))
+def test_a_delay_within_a_step_is_seen_on_the_line_between_its_ends(
+    late: int, part: float, every: int
+) -> None:
+    steps = 42
+    theta, rate = moving(steps, 2)
+    sensors = Sensors(delay=(late + part) * H)
+    control = step(sensors=sensors, every=every, steps=steps, start=theta[:, 0], seeds=(0, 1))
+    k = np.arange(0, steps, every) - late
+    newer = np.maximum(k, 0)
+    older = np.maximum(k - 1, 0)
+    for seen, true in zip(observed(control, theta, rate, every), (theta, rate), strict=True):
+        line = (1.0 - part) * true[:, newer] + part * true[:, older]
+        np.testing.assert_allclose(seen, line, rtol=0.0, atol=1e-12)
+
+
 def test_exact_sensors_show_what_is_there() -> None:
     theta, rate = moving(10)
     angles, rates = observed(step(start=theta[:, 0]), theta, rate, 1)

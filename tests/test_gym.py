@@ -68,7 +68,7 @@ def test_a_seed_says_all(kind: str) -> None:
 def test_a_later_episode_is_as_the_first(kind: str) -> None:
     """Nothing is left of an episode that was broken off: bus, sensors, solver, noise."""
     options: dict[str, Any] = {
-        "servo": Servo(delay=0.012, rate=333.0),
+        "servo": Servo(delay=0.012, rate=1.0 / 0.003),
         "sensors": Sensors(delay=0.007, noise=0.01),
         "duration": 0.1,
     }

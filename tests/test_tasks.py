@@ -282,6 +282,8 @@ def test_motion_action_is_a_lead_of_the_servos_lag() -> None:
         ("track", {"action": "speed"}, r"unknown action 'speed'; known: motion, position, torque"),
         ("track", {"action": "torque"}, r"action 'torque' needs a servo with a limit"),
         ("track", {"period": 0.0015}, r"period must be a whole number of timesteps of 0.001 s"),
+        ("track", {"servo": Servo(rate=333.0)}, r"servo.rate must be 1 / \(a whole number of "),
+        ("track", {"servo": Servo(rate=2e3)}, r"servo.rate must be in \(0, 1000\] Hz, at most one"),
         ("track", {"duration": 0.0012}, r"duration must be a whole number of periods of 0.005"),
         ("track", {"duration": float("nan")}, r"duration must be in \(0, 1000\) s, got nan"),
         ("track", {"span": 4.0}, r"span must be in \(0, 3.14159\) rad, got 4.0"),

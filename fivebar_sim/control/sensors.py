@@ -13,7 +13,8 @@ class Sensors(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
         seen = round((theta(t - delay) + noise n) / resolution) resolution,   n ~ N(0, 1)
 
     Attributes:
-        delay: Age of a reading [s]; rounded to whole timesteps.
+        delay: Age of a reading [s]. Where it ends within a timestep, the reading lies on the
+            straight line between the step's start and its end.
         noise: Standard deviation of the angles [rad], white from one control step to the next.
         rate_noise: Standard deviation of the rates [rad/s].
         resolution: Step of the angles [rad], such as 2 pi / 4096; 0 for exact angles. Rates are

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from fivebar_sim.arrays import Array, Bools
 from fivebar_sim.checks import check_number, check_step
-from fivebar_sim.control import winding
+from fivebar_sim.control import delay, winding
 from fivebar_sim.dynamics.heat import Winding
 from fivebar_sim.errors import ArgumentError
 from fivebar_sim.files import presets, tables
@@ -168,11 +168,7 @@ class Servo(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
 
     def late(self, steps: int, timestep: float) -> tuple[int, float]:
         """Return the whole timesteps in the delay, at most `steps`, and the part of one beyond."""
-        part = min(self.delay / timestep, steps)
-        # Decimals are rounded as floats: 0.003 / 0.001 is 3 to a part in a million.
-        if abs(part - round(part)) < 1e-6:
-            return round(part), 0.0
-        return int(part), part - int(part)
+        return delay.in_steps(self.delay, timestep, steps)
 
     def latched(self, steps: int, timestep: float, more: int = 0) -> NDArray[np.int64]:
         """Return which row of a table of commands acts in each step, (N,); -1 before the first.

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from fivebar_sim.arrays import Array
 from fivebar_sim.checks import LARGEST, check_number
+from fivebar_sim.control import delay
 from fivebar_sim.control.bus import Bus, Steps
 from fivebar_sim.control.interface import Observation
 from fivebar_sim.control.noise import Noise
@@ -87,9 +88,11 @@ class ControlStep:
         self._drive = drive
         self._h = timestep
         # A delay longer than the run shows only the start, and would need a longer buffer.
-        late = round(min(sensors.delay / timestep, steps))
-        # The last late + 1 states: row 0 is `delay` old, the last row is the present.
-        self._theta = np.empty((nsim, late + 1, 2))
+        late, self._part = delay.in_steps(sensors.delay, timestep, steps)
+        # The last states: the last row is the present, and `delay` ago is at row 0, or between it
+        # and row 1.
+        rows = late + 1 + (self._part > 0.0)
+        self._theta = np.empty((nsim, rows, 2))
         self._theta_dot = np.zeros_like(self._theta)
         noisy = sensors.noise > 0.0 or sensors.rate_noise > 0.0
         self._noise = Noise(nsim) if noisy else None
@@ -120,8 +123,8 @@ class ControlStep:
         """Return what the sensors show at step k; the time is (nsim,) if k is."""
         sensors = self._sensors
         time = cast(float, k * self._h)
-        theta = self._theta[:, 0]
-        theta_dot = self._theta_dot[:, 0]
+        theta = self._seen(self._theta)
+        theta_dot = self._seen(self._theta_dot)
         if self._noise is not None:
             drawn = self._noise.draw()
             theta = theta + sensors.noise * drawn[:, 0]
@@ -130,6 +133,12 @@ class ControlStep:
         if sensors.resolution > 0.0:
             theta = np.round(theta / sensors.resolution) * sensors.resolution
         return Observation(time, theta, theta_dot)
+
+    def _seen(self, states: Array) -> Array:
+        """Return what was there `delay` ago, given the last states, (nsim, 2)."""
+        if self._part == 0.0:
+            return states[:, 0]
+        return states[:, 1] + self._part * (states[:, 0] - states[:, 1])
 
     def send(self, k: Steps, command: Array) -> Array:
         """Return what reaches the motors in each step until the next control step, (nsim, n, 2).

@@ -126,9 +126,9 @@ def holds(found: Convergence, bar: float, tolerance: float) -> bool:
 def refined(scenario: Scenario, parts: int, integrator: Integrator) -> Scenario:
     """Return the same experiment in finer steps.
 
-    A bus's rate and delay and the delay of sensors are rounded to whole timesteps; here to those of
-    the scenario itself, so that commands come and act at the same times. Control periods are whole
-    timesteps already.
+    A bus's rate is rounded to whole timesteps; here to those of the scenario itself, so that
+    commands come at the same times. Control periods are whole timesteps already, and delays need
+    not be.
 
     Args:
         scenario: The experiment.
@@ -151,11 +151,9 @@ def refined(scenario: Scenario, parts: int, integrator: Integrator) -> Scenario:
         period = max(h, _whole(1.0 / servo.rate, h))
         whole = math.isclose(1.0, servo.rate * period)
         servo = msgspec.structs.replace(servo, rate=servo.rate if whole else 1.0 / period)
-    sensors = scenario.sensors
     return msgspec.structs.replace(
         scenario,
         servo=servo,
-        sensors=msgspec.structs.replace(sensors, delay=_whole(sensors.delay, h)),
         sim=msgspec.structs.replace(scenario.sim, timestep=h / parts, integrator=integrator),
     )
 

@@ -101,6 +101,13 @@ class Task(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
         check_number("spread", self.spread, "m", low=0.0, high=self.leg.size)
         check_number("timestep", self.timestep, "s", low=0.0, strict=True)
         check_whole_steps("period", self.period, self.timestep)
+        # As in a scenario: no bus is faster than the timestep, or rounded to another one.
+        try:
+            self.servo.check_rate(self.timestep)
+            self.servo.check_whole(self.timestep)
+        except ArgumentError as error:
+            raise ArgumentError(f"servo.{error}") from None
+
         check_number("duration", self.duration, "s", low=0.0, high=LONGEST, strict=True)
         periods = round(self.duration / self.period)
         # To a part in a million, as in `whole_steps`: decimals are rounded as floats.
