@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import shutil
 from functools import cache
 from pathlib import Path
 
@@ -41,8 +40,8 @@ def written(name: str, folder: Path) -> Path:
     result = results()[name]
     text = tomli_w.dumps(result.scenario.table())
     (folder / "scenario.toml").write_text(text, encoding="utf-8")
-    for copy, source in result.scenario.files.items():
-        shutil.copyfile(source, folder / copy)
+    for name, content in result.scenario.files.items():
+        (folder / name).write_bytes(content)
     (folder / "metrics.json").write_text(json.dumps(result.metrics), encoding="utf-8")
     directory.write_record(folder / "rollout.parquet", result.record)
     return folder

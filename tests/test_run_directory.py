@@ -16,6 +16,7 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 from fivebar_controllers.pd import Pd
+from shell import CSV
 
 from fivebar_sim import report, rollout
 from fivebar_sim.errors import RunDirectoryError
@@ -36,6 +37,14 @@ MEASURED = [
     *("load.share_A", "load.thermal_share_A", "branch.working_mode", "branch.assembly"),
     *("branch.flips", "warnings", "verdict"),
 ]
+
+FOLLOWING = """
+duration = 0.5
+[path]
+kind = "csv"
+file = "trot.csv"
+ramp = 0.1
+"""
 
 
 @pytest.fixture(scope="module")
@@ -234,6 +243,16 @@ def test_relative_and_odd_names_are_taken_literally(
     for name in ("plain", "~", "~/mine", "s3:/bucket", "two words", "é"):
         directory.check_run(result.write(name))
     assert names(tmp_path) == {"plain", "~", "s3:", "two words", "é"}
+
+
+def test_a_csv_is_kept_as_it_was_when_it_was_read(tmp_path: Path) -> None:
+    (tmp_path / "trot.csv").write_text(CSV, encoding="utf-8")
+    (tmp_path / "mine.toml").write_text(FOLLOWING, encoding="utf-8")
+    planned = rollout.plan(Scenario.load(tmp_path / "mine.toml"))
+    (tmp_path / "trot.csv").write_text(CSV.replace("-80", "-78"), encoding="utf-8")
+    where = rollout.execute(planned).write(tmp_path / "mine")
+    assert (where / "trot.csv").read_text(encoding="utf-8") == CSV
+    assert Result.read(where).scenario.path.at(0.0).position.tolist() == [0.0, -0.08]
 
 
 # refusal

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import shutil
 from pathlib import Path
 
 import msgspec
@@ -164,8 +163,8 @@ def test_resolved_table_gives_the_same_run(tmp_path: Path, name: str) -> None:
     folder = tmp_path / "run"
     folder.mkdir()
     (folder / "scenario.toml").write_text(tomli_w.dumps(first.table()), encoding="utf-8")
-    for name, source in first.files.items():
-        shutil.copyfile(source, folder / name)
+    for name, content in first.files.items():
+        (folder / name).write_bytes(content)
     again = Scenario.load(folder / "scenario.toml")
     assert again.table() == first.table()
     if isinstance(first.path, Csv) and isinstance(again.path, Csv):

@@ -17,13 +17,15 @@ from numpy.typing import ArrayLike
 
 from fivebar_sim.errors import ArgumentError, ConfigError
 from fivebar_sim.paths.base import TIME_ROUNDING, FootPath, Sample, check_number
-from fivebar_sim.paths.track import TimedPairs, read_track
+from fivebar_sim.paths.track import TimedPairs, read_bytes, read_track
 
 if TYPE_CHECKING:
     from scipy.interpolate import CubicSpline
 
 HEADERS = {("time_s", "x_mm", "z_mm"): 1e-3, ("time_s", "x_m", "z_m"): 1.0}
 """The legal headers, each with its unit in metres."""
+
+WHAT = "foot path"
 
 
 class _Curve(NamedTuple):
@@ -107,11 +109,16 @@ class Csv(FootPath, frozen=True, tag="csv", dict=True):
         _ = self._curve
 
     @cached_property
+    def content(self) -> bytes:
+        """All of the file, as it was when it was first needed; later changes do not count."""
+        return read_bytes(Path(self.file), WHAT)
+
+    @cached_property
     def _curve(self) -> _Curve:
         # Slow to import, and only this kind of path needs it.
         from scipy.interpolate import CubicSpline
 
-        track = read_track(Path(self.file), HEADERS, "foot path")
+        track = read_track(self.content, HEADERS, WHAT, Path(self.file))
         if not self.periodic:
             if not self.ramp <= track.span:
                 raise ConfigError(

@@ -47,20 +47,38 @@ class TimedPairs(NamedTuple):
         return bool(np.max(np.abs(self.pair[-1] - self.pair[0])) <= SAME_POINT)
 
 
-def read_track(file: Path, headers: Headers, what: str) -> TimedPairs:
-    """Return the rows of a CSV file, in SI units and from t = 0.
+def read_bytes(file: Path, what: str) -> bytes:
+    """Return all of a CSV file.
 
     Args:
         file: The CSV.
-        headers: The legal headers (time, x, z), each with its unit of x and z in SI.
         what: Kind of content, for messages: "foot path".
 
     Raises:
-        ConfigError: The file cannot be read, is not UTF-8, has another header, a row with the wrong
-            number of cells, a cell that is not a finite number, times that do not grow by at least
-            `SHORTEST`, or one row.
+        ConfigError: The file cannot be read.
     """
-    lines = _lines(file, what)
+    try:
+        input_file.check(file, input_file.TABLE)
+        return file.read_bytes()
+    except OSError as error:
+        raise ConfigError(f"cannot read {what} {file}: {error.strerror}") from None
+
+
+def read_track(raw: bytes, headers: Headers, what: str, file: Path) -> TimedPairs:
+    """Return the rows of a CSV file, in SI units and from t = 0.
+
+    Args:
+        raw: All of the file.
+        headers: The legal headers (time, x, z), each with its unit of x and z in SI.
+        what: Kind of content, for messages: "foot path".
+        file: The CSV, for messages.
+
+    Raises:
+        ConfigError: It is not UTF-8, has another header, a row with the wrong number of cells, a
+            cell that is not a finite number, times that do not grow by at least `SHORTEST`, or one
+            row.
+    """
+    lines = _lines(raw, file)
     if not lines:
         raise ConfigError(f"{file}: no header; {_legal(headers)}")
 
@@ -92,14 +110,8 @@ def read_track(file: Path, headers: Headers, what: str) -> TimedPairs:
     return TimedPairs(table[:, 0] - table[0, 0], scale * table[:, 1:])
 
 
-def _lines(file: Path, what: str) -> list[tuple[int, list[str]]]:
+def _lines(raw: bytes, file: Path) -> list[tuple[int, list[str]]]:
     """Return the lines that are neither blank nor comments, as (line number, stripped cells)."""
-    try:
-        input_file.check(file, input_file.TABLE)
-        raw = file.read_bytes()
-    except OSError as error:
-        raise ConfigError(f"cannot read {what} {file}: {error.strerror}") from None
-
     try:
         # -sig: some spreadsheets put a byte order mark in front.
         text = raw.decode("utf-8-sig")

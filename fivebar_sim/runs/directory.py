@@ -161,8 +161,8 @@ def _fill(stage: Path, result: rrd.Run) -> None:
     """Write the files of a run into an empty directory."""
     scenario = result.scenario
     (stage / "scenario.toml").write_text(tomli_w.dumps(scenario.table()), encoding="utf-8")
-    for name, source in scenario.files.items():
-        shutil.copyfile(source, stage / name)
+    for name, content in scenario.files.items():
+        (stage / name).write_bytes(content)
     text = json.dumps(result.measured.table, indent=2, allow_nan=False)
     (stage / "metrics.json").write_text(text + "\n", encoding="utf-8")
     write_record(stage / "rollout.parquet", result.record)

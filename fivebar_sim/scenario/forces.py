@@ -18,7 +18,7 @@ from fivebar_sim.arrays import Array
 from fivebar_sim.errors import ArgumentError
 from fivebar_sim.paths import FootPath, Gait
 from fivebar_sim.paths.base import Pair, check_pair, times
-from fivebar_sim.paths.track import TimedPairs, read_track
+from fivebar_sim.paths.track import TimedPairs, read_bytes, read_track
 
 __all__ = ["KINDS", "Constant", "Csv", "FootForce", "ForceSpec", "Stance"]
 
@@ -27,6 +27,8 @@ STRONGEST = 1e6
 
 HEADERS = {("time_s", "x_N", "z_N"): 1.0}
 """The legal header of a CSV, with its unit in newtons."""
+
+WHAT = "foot force"
 
 
 class FootForce(
@@ -169,8 +171,13 @@ class Csv(FootForce, frozen=True, tag="csv", dict=True):
         _ = self._track
 
     @cached_property
+    def content(self) -> bytes:
+        """All of the file, as it was when it was first needed; later changes do not count."""
+        return read_bytes(Path(self.file), WHAT)
+
+    @cached_property
     def _track(self) -> TimedPairs:
-        return read_track(Path(self.file), HEADERS, "foot force")
+        return read_track(self.content, HEADERS, WHAT, Path(self.file))
 
 
 ForceSpec = Constant | Csv | Stance

@@ -266,11 +266,11 @@ class Scenario(msgspec.Struct, frozen=True, kw_only=True):
         return path, f"force-{force}" if force is not None and force == path else force
 
     @property
-    def files(self) -> dict[str, str]:
-        """The CSVs to copy beside a resolved scenario: name of the copy to its source."""
+    def files(self) -> dict[str, bytes]:
+        """The CSVs that go with a resolved scenario, by name, as they were when they were read."""
         parts = zip((self.path, self.force), self.copies, strict=True)
         csvs = (paths.Csv, forces.Csv)
-        return {name: part.file for part, name in parts if name and isinstance(part, csvs)}
+        return {name: part.content for part, name in parts if name and isinstance(part, csvs)}
 
 
 def copied_name(part: FootPath | FootForce | None) -> str | None:
