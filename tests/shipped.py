@@ -43,5 +43,6 @@ def written(name: str, folder: Path) -> Path:
     for name, content in result.scenario.files.items():
         (folder / name).write_bytes(content)
     (folder / "metrics.json").write_text(json.dumps(result.metrics), encoding="utf-8")
-    directory.write_record(folder / "rollout.parquet", result.record)
+    others = ["scenario.toml", "metrics.json", *result.scenario.files]
+    directory.write_record(folder, result.record, others)
     return folder

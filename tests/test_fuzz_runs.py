@@ -17,6 +17,7 @@ from fuzz import Bench, Law
 from fuzz_damage import Damage
 from fuzz_inputs import jsons, mutated
 from hypothesis import strategies as st
+from sealed import seal
 from shell import ELLIPSE
 
 from fivebar_sim import rollout
@@ -123,6 +124,7 @@ def _read_by_all(bench: Bench, name: str, content: bytes) -> None:
     _restore(place)
     _restore(bench.folder / "other")
     (place / name).write_bytes(content)
+    seal(place)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(check, "reads", _reads_here)
         said = bench.lawful("replay", "mine")

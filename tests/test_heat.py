@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from sealed import seal
 
 from fivebar_sim import rollout
 from fivebar_sim.control.servo import Servo
@@ -235,5 +236,6 @@ def test_a_stored_run_without_the_heat_that_it_limits_is_refused(tmp_path: Path)
     table = json.loads(file.read_text("utf-8"))
     del table["load"]["survives"]
     file.write_text(json.dumps(table), "utf-8")
+    seal(file.parent)
     with pytest.raises(RunDirectoryError, match=r"load.survives is missing: run its scenario"):
         stored.read(tmp_path / "run")

@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 from msgspec.structs import replace
 from reports import Page
+from sealed import seal
 from shell import Shell
 
 from fivebar_sim import report, rollout
@@ -302,6 +303,7 @@ def _with(key: str, value: object) -> Callable[[Path], object]:
         if value is not MISSING:
             table[last] = value
         file.write_text(json.dumps(metrics))
+        seal(run)
 
     return change
 

@@ -255,6 +255,19 @@ def test_a_csv_is_kept_as_it_was_when_it_was_read(tmp_path: Path) -> None:
     assert Result.read(where).scenario.path.at(0.0).position.tolist() == [0.0, -0.08]
 
 
+@pytest.mark.usefixtures("light")
+def test_a_users_file_that_an_edited_scenario_names_is_not_the_runs(
+    tmp_path: Path, result: Result
+) -> None:
+    where = rollout.run(Scenario.load("q8bot-trot", ["duration=2.1"])).write(tmp_path / "mine")
+    (where / "q8bot_trot.csv").rename(where / "better.csv")
+    scenario = (where / "scenario.toml").read_text(encoding="utf-8")
+    scenario = scenario.replace("q8bot_trot.csv", "better.csv")
+    (where / "scenario.toml").write_text(scenario, encoding="utf-8")
+    result.write(where)
+    assert names(where) == {*FILES, "better.csv"}
+
+
 # refusal
 
 

@@ -8,10 +8,12 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import pytest
+from sealed import seal
 from shell import Shell
 
 from fivebar_sim import rollout
 from fivebar_sim.errors import RunDirectoryError
+from fivebar_sim.rollout import Result
 from fivebar_sim.runs import stored_metrics
 from fivebar_sim.scenario import Scenario, scenes
 
@@ -142,7 +144,22 @@ def test_every_reader_refuses_alike(shell: Shell) -> None:
     metrics = json.loads(Path("mine/metrics.json").read_text())
     del metrics["guards"][0]["ok"]
     _saved(Path("mine"), metrics)
+    seal(Path("mine"))
     commands = ["report mine", "report other mine", "replay mine", "replay other mine --web"]
     for command in [*commands, "render mine"]:
         said = shell.refused(*command.split())
         assert said.startswith("mine/metrics.json: guards[0].ok is missing")
+
+
+def test_every_reader_refuses_metrics_that_were_made_better(shell: Shell) -> None:
+    for name in ("mine", "other"):
+        assert shell("run", "short.toml", "--quiet", "--out", name).status == 0
+    metrics = json.loads(Path("mine/metrics.json").read_text())
+    metrics["tracking"]["rms"] *= 0.5
+    _saved(Path("mine"), metrics)
+    commands = ["report mine", "report other mine", "replay mine", "replay other mine --web"]
+    for command in [*commands, "render mine"]:
+        said = shell.refused(*command.split())
+        assert said.startswith("mine/metrics.json is not the run's: it was changed after the run")
+    with pytest.raises(RunDirectoryError, match=r"metrics\.json is not the run's"):
+        Result.read("mine")

@@ -12,6 +12,7 @@ import numpy as np
 import pyarrow
 import pyarrow.parquet
 import pytest
+from sealed import seal
 
 from fivebar_sim import rollout
 from fivebar_sim.errors import RunDirectoryError
@@ -40,9 +41,80 @@ def test_what_was_written_comes_back(result: Result, written: Path) -> None:
         np.testing.assert_array_equal(run.record[name], column, err_msg=name)
 
 
+@pytest.fixture(scope="module")
+def trot(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a run whose foot follows a CSV."""
+    made = rollout.run(Scenario.load("q8bot-trot", ["duration=2.1"]))
+    return made.write(tmp_path_factory.mktemp("runs") / "trot")
+
+
+def _edited(file: Path) -> None:
+    file.write_bytes(file.read_bytes() + b"\n")
+
+
+def _of_other(run: Path, name: str) -> None:
+    """Put the file of another run there, of the same scenario with a stiffer servo."""
+    other = rollout.run(Scenario.load("q8bot-trot", ["duration=2.1", "servo.kp=20.0"]))
+    shutil.copy(other.write(run.parent / "other") / name, run / name)
+
+
+def _scaled(run: Path, column: str) -> None:
+    """Change a column, and keep the metadata."""
+    file = run / "rollout.parquet"
+    table = pyarrow.parquet.read_table(file)
+    new = pyarrow.array(0.9 * table[column].to_numpy())
+    table = table.set_column(table.column_names.index(column), column, new)
+    pyarrow.parquet.write_table(table, file)
+
+
+def _bare(run: Path) -> None:
+    file = run / "rollout.parquet"
+    table = pyarrow.parquet.read_table(file).replace_schema_metadata(None)
+    pyarrow.parquet.write_table(table, file)
+
+
+CHANGED = "is not the run's: it was changed after the run, or is another run's; run scenario.toml"
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (lambda run: _edited(run / "metrics.json"), f"metrics.json {CHANGED} again"),
+        (lambda run: _edited(run / "scenario.toml"), f"scenario.toml {CHANGED} again"),
+        (lambda run: _edited(run / "q8bot_trot.csv"), f"q8bot_trot.csv {CHANGED} again"),
+        (lambda run: (run / "q8bot_trot.csv").unlink(), "q8bot_trot.csv is missing"),
+        (lambda run: _of_other(run, "metrics.json"), f"metrics.json {CHANGED} again"),
+        (lambda run: _of_other(run, "scenario.toml"), f"scenario.toml {CHANGED} again"),
+        (
+            lambda run: _of_other(run, "rollout.parquet"),
+            "rollout.parquet is of another run than scenario.toml and metrics.json beside it",
+        ),
+        (lambda run: _scaled(run, "torque_A"), f"rollout.parquet {CHANGED} again"),
+        (_bare, "rollout.parquet has no checksums"),
+    ],
+)
+def test_a_file_that_is_not_the_runs_is_named(
+    trot: Path, tmp_path: Path, change: Callable[[Path], object], said: str
+) -> None:
+    run = shutil.copytree(trot, tmp_path / "run")
+    (run / "notes.txt").write_text("mine", encoding="utf-8")
+    stored.read(run)
+    change(run)
+    with pytest.raises(RunDirectoryError) as caught:
+        stored.read(run)
+    message = str(caught.value)
+    assert message.startswith(f"{run}/{said}")
+    assert "\n" not in message
+
+
 def _truncated(run: Path) -> None:
     file = run / "rollout.parquet"
     file.write_bytes(file.read_bytes()[:-100])
+
+
+def _rewritten(file: Path, text: str) -> None:
+    file.write_text(text, encoding="utf-8")
+    seal(file.parent)
 
 
 def _foreign(run: Path) -> None:
@@ -92,11 +164,8 @@ def _worded(run: Path, column: str) -> None:
         (lambda run: _worded(run, "gap"), "column gap must be numbers, all there"),
         (_shortened, "a run of 0.8 s at 0.001 s has 800 rows, got 700"),
         (lambda run: (run / "rollout.parquet").write_bytes(b""), "is not a record, or is damaged"),
-        (lambda run: (run / "metrics.json").write_text("{"), "metrics.json is not JSON: "),
-        (
-            lambda run: (run / "metrics.json").write_text("[" * 100_000),
-            "metrics.json is not JSON: ",
-        ),
+        (lambda run: _rewritten(run / "metrics.json", "{"), "metrics.json is not JSON: "),
+        (lambda run: _rewritten(run / "metrics.json", "[" * 100_000), "metrics.json is not JSON: "),
         (
             lambda run: _without(run, "ground_z"),
             "not a record of the scene 'rail': it lacks the column",
@@ -115,7 +184,7 @@ def _worded(run: Path, column: str) -> None:
             lambda run: (run / "metrics.json").unlink(),
             "is not a run directory: it lacks metrics.json",
         ),
-        (lambda run: (run / "scenario.toml").write_text("x = 1"), "cannot be read as a run: "),
+        (lambda run: _rewritten(run / "scenario.toml", "x = 1"), "cannot be read as a run: "),
         (shutil.rmtree, "is not a run directory: no such directory"),
     ],
 )

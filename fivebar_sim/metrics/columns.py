@@ -5,6 +5,7 @@ Every other list of columns, joints or motors is taken from here.
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Mapping
 
 import numpy as np
@@ -61,6 +62,15 @@ RAIL_COLUMN = "rail_end"
 
 BELT_COLUMN = "belt_x"
 """How far a treadmill's belt has run."""
+
+
+def digest(record: Mapping[str, Array]) -> str:
+    """Return a checksum of a record's columns, in whatever order: SHA-256 in hexadecimal."""
+    found = hashlib.sha256()
+    for name in sorted(record):
+        found.update(name.encode())
+        found.update(np.ascontiguousarray(record[name], dtype=np.float64).data)
+    return found.hexdigest()
 
 
 def motors(record: Mapping[str, Array], name: str) -> Array:

@@ -9,7 +9,7 @@ import errno
 import json
 import shutil
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 import tomli_w
@@ -17,7 +17,9 @@ import tomli_w
 from fivebar_sim.arrays import Array
 from fivebar_sim.errors import RunDirectoryError
 from fivebar_sim.files import exchange, leftovers, whole_file
+from fivebar_sim.metrics.columns import digest
 from fivebar_sim.recording import rrd
+from fivebar_sim.runs import checksums
 from fivebar_sim.runs.kept import DIVERGED, FILES, keep, own_names
 
 RECORDING = "recording.rrd"
@@ -165,18 +167,28 @@ def _fill(stage: Path, result: rrd.Run) -> None:
         (stage / name).write_bytes(content)
     text = json.dumps(result.measured.table, indent=2, allow_nan=False)
     (stage / "metrics.json").write_text(text + "\n", encoding="utf-8")
-    write_record(stage / "rollout.parquet", result.record)
+    # Last of these: it has the checksums of the others.
+    others = ["scenario.toml", "metrics.json", *scenario.files]
+    write_record(stage, result.record, others)
     rrd.write(stage / RECORDING, [result])
 
 
-def write_record(path: Path, record: Mapping[str, Array]) -> None:
-    """Write the record as Parquet, one column each, with checksums that show damage."""
+def write_record(folder: Path, record: Mapping[str, Array], others: Iterable[str]) -> None:
+    """Write the record as Parquet, one column each, with checksums that show damage.
+
+    Args:
+        folder: The run directory.
+        record: The columns.
+        others: Names of the run's other files, which are there: their checksums go with it.
+    """
     import pyarrow
     import pyarrow.parquet
 
+    sums = checksums.of_files(folder, others) | {checksums.RECORD: digest(record)}
+    table = pyarrow.table(dict(record)).replace_schema_metadata(checksums.written(sums))
     # Given a name instead of a file, pyarrow would expand ~ and read it as a URI.
-    with path.open("wb") as file:
-        pyarrow.parquet.write_table(pyarrow.table(dict(record)), file, write_page_checksum=True)
+    with (folder / checksums.RECORD).open("wb") as file:
+        pyarrow.parquet.write_table(table, file, write_page_checksum=True)
 
 
 def _exchange(stage: Path, path: Path) -> None:

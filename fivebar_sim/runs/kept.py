@@ -8,8 +8,7 @@ import shutil
 from collections.abc import Collection
 from pathlib import Path
 
-from fivebar_sim.errors import FiveBarError
-from fivebar_sim.scenario import Scenario
+from fivebar_sim.runs import checksums
 
 FILES = ("scenario.toml", "metrics.json", "rollout.parquet", "recording.rrd")
 """What a complete run directory holds."""
@@ -26,12 +25,8 @@ UNLINKED = {errno.EPERM, errno.EACCES, errno.ENOTSUP, errno.EXDEV, errno.EMLINK,
 
 def own_names(path: Path) -> set[str]:
     """Return the names of a run's own files: `FILES`, its scenario's, its report, `DIVERGED`."""
-    try:
-        inputs = list(Scenario.load(path / "scenario.toml").files)
-    # Its controller may be gone: then its inputs stay, which harms nobody.
-    except FiveBarError:
-        inputs = []
-    return {*FILES, *inputs, REPORT, DIVERGED}
+    # Not those that its scenario.toml names: who has edited it may have named a file of their own.
+    return {*FILES, *checksums.listed(path), REPORT, DIVERGED}
 
 
 def keep(path: Path, stage: Path) -> None:

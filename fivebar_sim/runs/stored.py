@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -20,7 +22,7 @@ from fivebar_sim.metrics.columns import (
 )
 from fivebar_sim.metrics.limits import has
 from fivebar_sim.metrics.measured import Judged
-from fivebar_sim.runs import directory, stored_metrics
+from fivebar_sim.runs import checksums, directory, stored_metrics
 from fivebar_sim.scenario import Scenario
 from fivebar_sim.scenario.scenes import Ground, Treadmill
 
@@ -62,20 +64,22 @@ def read(path: Path) -> StoredRun:
     """Return the run of a directory.
 
     Raises:
-        RunDirectoryError: It lacks one of `SOURCES`, or a file of it is damaged or foreign; names
-            the file.
+        RunDirectoryError: It lacks one of `SOURCES`, or a file of it is damaged, was changed after
+            the run, or is another run's; names the file.
     """
     if not all((path / name).is_file() for name in SOURCES):
         directory.check_run(path)
 
-    try:
-        scenario = Scenario.load(path / "scenario.toml")
-    except FiveBarError as error:
-        raise RunDirectoryError(f"{path} cannot be read as a run: {error}") from None
+    file = path / checksums.RECORD
+    with _opened(file) as parquet:
+        sums = checksums.read(parquet.schema_arrow.metadata)
+        # First: of a file of another run, any other message would be about the wrong one.
+        checksums.check_files(path, sums)
+        scenario = _scenario(path)
+        record = _record(file, parquet, scenario)
 
-    file = path / "rollout.parquet"
-    record = _record(file, scenario)
     _check_plausible(file, record, scenario.sim.timestep)
+    checksums.check_record(file, record, sums)
     grounded = isinstance(scenario.scene, Ground)
     measured = stored_metrics.read(path / "metrics.json", grounded=grounded)
     for key in scenario.limits:
@@ -86,6 +90,14 @@ def read(path: Path) -> StoredRun:
             )
 
     return StoredRun(path, scenario, record, measured)
+
+
+def _scenario(path: Path) -> Scenario:
+    """Return the scenario of a run directory."""
+    try:
+        return Scenario.load(path / "scenario.toml")
+    except FiveBarError as error:
+        raise RunDirectoryError(f"{path} cannot be read as a run: {error}") from None
 
 
 def _check_plausible(file: Path, record: Record, timestep: float) -> None:
@@ -124,18 +136,16 @@ def _own_columns(scenario: Scenario) -> list[str]:
     return columns
 
 
-def _record(file: Path, scenario: Scenario) -> Record:
-    """Return the columns of a scenario's record."""
+@contextmanager
+def _opened(file: Path) -> Iterator[ParquetFile]:
+    """Open a record; whatever is wrong with the file is raised in one line."""
     import pyarrow
     import pyarrow.parquet
 
     try:
         # Given a name instead of a file, pyarrow would expand ~ and read it as a URI.
         with file.open("rb") as stream:
-            parquet = pyarrow.parquet.ParquetFile(stream, page_checksum_verification=True)
-            # Before the rows: some megabytes can hold a thousand times as much.
-            _check_layout(file, parquet, scenario)
-            table = parquet.read(columns=[*COLUMNS, *_own_columns(scenario)])
+            yield pyarrow.parquet.ParquetFile(stream, page_checksum_verification=True)
     # It is an OSError too.
     except RunDirectoryError:
         raise
@@ -146,6 +156,12 @@ def _record(file: Path, scenario: Scenario) -> Record:
         message = " ".join(str(error).split())
         raise RunDirectoryError(f"{file} is not a record, or is damaged: {message}") from None
 
+
+def _record(file: Path, parquet: ParquetFile, scenario: Scenario) -> Record:
+    """Return the columns of a scenario's record."""
+    # Before the rows: some megabytes can hold a thousand times as much.
+    _check_layout(file, parquet, scenario)
+    table = parquet.read(columns=[*COLUMNS, *_own_columns(scenario)])
     record: Record = {}
     for name in table.column_names:
         column = table[name]
