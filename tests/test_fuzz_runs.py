@@ -91,9 +91,8 @@ def any_replay(bench: Bench, damage: Damage) -> None:
         _check_record(place)
 
 
-def _reads_here(path: Path) -> bool:
-    read_through(path)
-    return True
+def _reads_here(path: Path, run: str) -> bool:
+    return read_through(path) == run
 
 
 def _check_record(place: Path) -> None:

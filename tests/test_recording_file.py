@@ -82,6 +82,21 @@ def test_one_that_cannot_be_read_is_rebuilt(
     assert set(os.listdir(run)) == names
 
 
+def test_the_recording_of_another_run_is_rebuilt(run: Path, content: str) -> None:
+    other = rollout.run(Scenario.load("classic-ellipse", ["duration=0.8", "servo.kp=20.0"]))
+    own = run / "recording.rrd"
+    shutil.copy(other.write(run.parent / "other") / "recording.rrd", own)
+    assert digest(own) != content
+    with recording_file.opened([run]) as file:
+        assert file == own
+    assert digest(own) == content
+
+    # What was rebuilt is known as the run's.
+    rebuilt = own.stat().st_mtime_ns
+    with recording_file.opened([run]):
+        assert own.stat().st_mtime_ns == rebuilt
+
+
 def test_in_a_directory_one_may_not_write_in_it_is_temporary(
     run: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -1,7 +1,8 @@
 """Check that Rerun can read a whole recording, as a separate program: some damage crashes it.
 
-Usage: python -m fivebar_sim.recording.check RECORDING. Exit status 0 if it can be read. Rerun's own
-messages about the damage help nobody; they go where the caller sends them.
+Usage: python -m fivebar_sim.recording.check RECORDING [RUN]. Exit status 0 if it can be read and,
+where a run is given, is that run's. Rerun's own messages about the damage help nobody; they go
+where the caller sends them.
 """
 
 from __future__ import annotations
@@ -13,25 +14,37 @@ import warnings
 from contextlib import suppress
 from pathlib import Path
 
+PROPERTY = "run"
+"""The property that says which run a recording is of; it has one column, `sha256`."""
 
-def reads(path: Path) -> bool:
-    """Return whether the installed Rerun reads a file, tried in another process.
+
+def reads(path: Path, run: str | None = None) -> bool:
+    """Return whether the installed Rerun reads a recording, tried in another process.
 
     In this process a panic of the reader would end the whole program.
+
+    Args:
+        path: The recording.
+        run: What identifies the run whose recording it must be, see `identity`; None for any.
     """
     # -P: a rerun.py in the user's folder must not be imported for Rerun.
     command = [sys.executable, "-P", "-m", "fivebar_sim.recording.check", str(path)]
+    if run is not None:
+        command.append(run)
+
     nowhere = subprocess.DEVNULL
     return subprocess.call(command, stdin=nowhere, stdout=nowhere, stderr=nowhere) == 0
 
 
-def read_through(path: Path) -> None:
-    """Read a recording in this process.
+def read_through(path: Path) -> str | None:
+    """Read a recording in this process; return which run it is of, None if it does not say.
 
     Raises:
         Exception: Any, if Rerun cannot read it.
     """
     from rerun.chunk import RrdReader
+
+    run = None
 
     with warnings.catch_warnings():
         # A recording that was cut off has no footer, and the reader warns of that.
@@ -40,7 +53,9 @@ def read_through(path: Path) -> None:
         # The store opens only with a whole footer; the stream finds every other damage.
         reader.store()
         for chunk in reader.stream():
-            del chunk
+            if chunk.entity_path == f"/__properties/{PROPERTY}":
+                run = chunk.to_record_batch()["sha256"].to_pylist()[0][0]
+    return run
 
 
 if __name__ == "__main__":
@@ -52,4 +67,5 @@ if __name__ == "__main__":
         resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     # Rerun sends no analytics in CI.
     os.environ["CI"] = "true"
-    read_through(Path(sys.argv[1]))
+    found = read_through(Path(sys.argv[1]))
+    sys.exit(sys.argv[2:] not in ([], [found]))

@@ -22,6 +22,8 @@ from fivebar_sim.metrics.columns import Record
 from fivebar_sim.metrics.measured import Judged
 from fivebar_sim.recording import foot, ground, layout
 from fivebar_sim.recording import leg as scene
+from fivebar_sim.recording.check import PROPERTY
+from fivebar_sim.recording.identity import identity
 from fivebar_sim.recording.look import Look, looks
 from fivebar_sim.recording.plots import Series, series
 from fivebar_sim.recording.poses import (
@@ -211,6 +213,8 @@ def _send_run(
     drawn = times(time[rows], rows + 1)
     # As JSON, since a plain value keeps the type that it first had.
     stream.send_property(f"{look.root}leg", rr.AnyValues(json=json.dumps(asdict(leg))))
+    own = identity(run.scenario, run.record, run.measured)
+    stream.send_property(f"{look.root}{PROPERTY}", rr.AnyValues(sha256=own))
     scene.log_leg(stream, leg, look)
     scene.send_leg(stream, leg, moved, look, drawn)
     foot.log_foot(stream, points(run.record, "target"), look)

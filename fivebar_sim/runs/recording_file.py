@@ -12,6 +12,7 @@ from pathlib import Path
 
 from fivebar_sim.errors import ConfigError
 from fivebar_sim.recording import check, rrd
+from fivebar_sim.recording.identity import identity
 from fivebar_sim.runs import stored
 
 RECORDING = "recording.rrd"
@@ -22,8 +23,8 @@ def opened(paths: Sequence[Path]) -> Iterator[Path]:
     """Yield the recording of a run directory, or of several drawn over each other.
 
     For one run it is the directory's own recording.rrd: rebuilt from the record if it is missing,
-    damaged, or written by another Rerun, and saved there if possible. For several it is a temporary
-    file, removed afterwards.
+    damaged, another run's, or written by another Rerun, and saved there if possible. For several it
+    is a temporary file, removed afterwards.
 
     Args:
         paths: Run directories, at least one, all different.
@@ -61,7 +62,7 @@ def labels_of(paths: Sequence[Path]) -> list[str]:
 def _own(run: stored.StoredRun, folder: Path) -> Path:
     """Return a readable recording of one run: its own, or a new one in the folder."""
     own = run.path / RECORDING
-    if is_readable(own):
+    if is_readable(own, identity(run.scenario, run.record, run.measured)):
         return own
 
     try:
@@ -85,13 +86,17 @@ def _own(run: stored.StoredRun, folder: Path) -> Path:
     return own
 
 
-def is_readable(path: Path) -> bool:
+def is_readable(path: Path, run: str | None = None) -> bool:
     """Return whether the installed Rerun can read a recording to its end.
 
     A recording of a newer Rerun counts as unreadable: Rerun skips what it does not know there, with
     a warning.
+
+    Args:
+        path: The recording.
+        run: What identifies the run whose recording it must be, see `identity`; None for any.
     """
-    return path.is_file() and not is_newer(path) and check.reads(path)
+    return path.is_file() and not is_newer(path) and check.reads(path, run)
 
 
 def is_newer(path: Path) -> bool:
