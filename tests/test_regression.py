@@ -142,6 +142,17 @@ def test_failures_say_how_far_and_remarks_what_else() -> None:
     assert "no baseline" in comparison.compare(here, None).notes[0]
 
 
+def test_metrics_that_a_baseline_lacks_are_named() -> None:
+    measured: dict[str, float | None] = {"tracking.rms": 1e-3, "closure.max": 2e-6}
+    here = result({**measured, "load.share_A": 0.6, "load.thermal_share_A": None})
+    checked = comparison.compare(here, recorded({"tracking.rms": 1e-3}))
+    assert checked.failures == []
+    assert checked.remarks == [
+        "its baseline lacks 2 of this run's metrics, which it judges by limits alone: "
+        "closure.max, load.share_A; --update records them"
+    ]
+
+
 @pytest.mark.parametrize(
     ("then", "now", "change"),
     [

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from fivebar_sim.metrics import guards
-from fivebar_sim.metrics.catalogue import LESS_IS_BETTER, SHOWN, shown
+from fivebar_sim.metrics.catalogue import ABSOLUTE, LESS_IS_BETTER, SHOWN, shown
 from fivebar_sim.metrics.limits import Limit, bounds, has, look_up
 from fivebar_sim.regression.baseline import Baseline, Recorded
 
@@ -54,7 +54,7 @@ class Checked(NamedTuple):
         rows: Its metrics that have a limit or a baseline.
         broke: Why the run itself failed: it diverged, or a guard tripped; "" if it did not.
         notes: Remarks that are not failures: a foot that does not follow its path, no baseline, or
-            one of another platform or version.
+            one of another platform or version, or one that lacks metrics.
     """
 
     name: str
@@ -110,13 +110,25 @@ def _broke(result: Result) -> str:
 
 
 def _notes(baseline: Baseline | None, metrics: Mapping[str, Any]) -> Iterator[str]:
-    """Yield remarks on a baseline: that it is missing, or was made otherwise."""
+    """Yield remarks on a baseline: that it or a part of it is missing, or was made otherwise."""
     if baseline is None:
         yield "no baseline: judged by its limits alone; --update records one"
         return
     differences = baseline.differences(metrics["provenance"])
     if differences:
         yield f"its baseline was made with {'; '.join(differences)}"
+
+    # Of a run that has no such number, nothing is missed.
+    lacking = [
+        key
+        for key in ABSOLUTE
+        if key not in baseline.metrics and has(metrics, key) and look_up(metrics, key) is not None
+    ]
+    if lacking:
+        yield (
+            f"its baseline lacks {len(lacking)} of this run's metrics, which it judges by limits "
+            f"alone: {', '.join(lacking)}; --update records them"
+        )
 
 
 def _row(
