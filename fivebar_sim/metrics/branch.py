@@ -11,7 +11,7 @@ import numpy as np
 from fivebar_sim import kinematics
 from fivebar_sim.arrays import Array
 from fivebar_sim.geometry import FiveBar
-from fivebar_sim.metrics.columns import JOINT_COLUMNS
+from fivebar_sim.metrics.columns import JOINT_COLUMNS, side_by_side
 from fivebar_sim.metrics.json_types import Amount, Count, Sign, Table
 
 
@@ -36,7 +36,7 @@ def measure(leg: FiveBar, record: Mapping[str, Array]) -> Branch:
 
     Every step is compared with the one before, the first with the leg's own branch.
     """
-    q = np.stack([record[name] for name in JOINT_COLUMNS], axis=-1)
+    q = side_by_side(record, JOINT_COLUMNS)
     signs = np.stack(kinematics.branch(leg, kinematics.chain_points(leg, q)), axis=-1)
     # Beginning with the leg's own branch, a start in another one counts as a flip.
     own = np.array([*leg.mode, leg.assembly])

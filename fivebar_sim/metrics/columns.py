@@ -6,7 +6,7 @@ Every other list of columns, joints or motors is taken from here.
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -73,9 +73,14 @@ def digest(record: Mapping[str, Array]) -> str:
     return found.hexdigest()
 
 
+def side_by_side(record: Mapping[str, Array], names: Sequence[str]) -> Array:
+    """Return columns side by side, (N, k): `JOINT_COLUMNS` are q."""
+    return np.stack([record[name] for name in names], axis=-1)
+
+
 def motors(record: Mapping[str, Array], name: str) -> Array:
     """Return a column of A and of E side by side, "torque" or "theta" as in torque_A, (N, 2)."""
-    return np.stack([record[f"{name}_{motor}"] for motor in MOTORS], axis=-1)
+    return side_by_side(record, [f"{name}_{motor}" for motor in MOTORS])
 
 
 def by_motor(pair: Array) -> dict[str, float]:

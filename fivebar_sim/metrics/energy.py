@@ -23,7 +23,13 @@ from fivebar_sim.arrays import Array
 from fivebar_sim.dynamics.chain import Chain, Pose, Vector, placed
 from fivebar_sim.geometry import FiveBar
 from fivebar_sim.kinematics.planar import end_velocity
-from fivebar_sim.metrics.columns import JOINT_COLUMNS, MOTOR_JOINTS, RATE_COLUMNS, motors
+from fivebar_sim.metrics.columns import (
+    JOINT_COLUMNS,
+    MOTOR_JOINTS,
+    RATE_COLUMNS,
+    motors,
+    side_by_side,
+)
 from fivebar_sim.metrics.ground import contact_radius
 from fivebar_sim.metrics.json_types import Amount, Number, Table
 
@@ -154,8 +160,8 @@ class _Motion(NamedTuple):
     @classmethod
     def of(cls, record: Mapping[str, Array], start: Array) -> _Motion:
         """Return the motion of a record that began at rest."""
-        q = np.stack([record[name] for name in JOINT_COLUMNS], axis=-1)
-        v = np.stack([record[name] for name in RATE_COLUMNS], axis=-1)
+        q = side_by_side(record, JOINT_COLUMNS)
+        v = side_by_side(record, RATE_COLUMNS)
         q = _begun(start[-4:], q)
         v = _begun(np.zeros(4), v)
         # A fixed hip is a hip at height 0 that never moves.

@@ -9,7 +9,7 @@ import numpy as np
 from fivebar_sim import kinematics
 from fivebar_sim.arrays import Array, Bools
 from fivebar_sim.geometry import FiveBar
-from fivebar_sim.metrics.columns import JOINT_COLUMNS
+from fivebar_sim.metrics.columns import JOINT_COLUMNS, side_by_side
 from fivebar_sim.metrics.json_types import Amount, Number, Part, Table
 
 
@@ -51,7 +51,7 @@ def depths(leg: FiveBar, record: Mapping[str, Array], trunk: float) -> dict[str,
         record: The columns of rollout.parquet.
         trunk: Height of the trunk's lowest point above the hip frame's origin [m].
     """
-    q = np.stack([record[name] for name in JOINT_COLUMNS], axis=-1)
+    q = side_by_side(record, JOINT_COLUMNS)
     points = kinematics.chain_points(leg, q)
     A, E = kinematics.bases(leg)
     heights = {"A": A[1], "B": points.B[:, 1], "D": points.D[:, 1], "E": E[1]}
