@@ -18,15 +18,25 @@ CONNECT = {
 """solref and solimp of the loop's closure by integrator; docs/model.md shows what they do."""
 
 
-ON_GROUND = 1e-4
-"""Default timestep of `implicitfast` on a ground [s]: longer ones let a light leg's foot creep."""
+FRICTION_RATE = 2.0 / (0.95 * 0.005)
+"""How fast friction stops a foot in the solver's eyes, v_dot = -b v [1/s]: 2 / (dmax timeconst).
+
+They are those of the geom `foot` in leg.xml.
+"""
+
+ON_RAIL = 5e-5
+"""Default timestep of `implicitfast` on a floor that stands still [s]; see `dynamics.creep`."""
+
+ON_BELT = 2e-5
+"""The same on a treadmill [s]: what a foot creeps adds up over a stance that goes one way."""
 
 
 class Sim(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """The table [sim] of a scenario.
 
     Attributes:
-        timestep: h [s]. A scenario on a ground under "implicitfast" that gives none has 0.1 ms.
+        timestep: h [s]. A scenario under "implicitfast" that gives none has 0.05 ms on a rail and
+            0.02 ms on a treadmill.
         integrator: MuJoCo's integrator, "discrete" or "implicitfast".
         seed: Seed of all random numbers in a run, such as the sensors' noise.
     """

@@ -18,13 +18,15 @@ import numpy as np
 from fivebar_sim import units
 from fivebar_sim.arrays import Array, Bools
 from fivebar_sim.checks import check_number
+from fivebar_sim.dynamics import creep
+from fivebar_sim.dynamics.creep import Footing
 from fivebar_sim.dynamics.heat import Heating
-from fivebar_sim.errors import unknown
+from fivebar_sim.errors import PoseError, unknown
 from fivebar_sim.geometry import FiveBar
 from fivebar_sim.kinematics.stops import Ranges, beyond
-from fivebar_sim.metrics import contact, ground
+from fivebar_sim.metrics import ground
 from fivebar_sim.metrics.branch import Branch
-from fivebar_sim.metrics.columns import JOINT_COLUMNS
+from fivebar_sim.metrics.columns import GROUND_COLUMNS, JOINT_COLUMNS, motors, side_by_side
 from fivebar_sim.metrics.energy import Balance
 from fivebar_sim.metrics.json_types import LARGEST, Amount, Number, Table
 from fivebar_sim.metrics.lasting import chattering, clipped
@@ -51,9 +53,8 @@ class Guards(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
         floor: Largest depth of a joint or the trunk in the floor, as a part of the leg's size.
         stops: Largest angle by which a joint may lean into a stop [rad]; above 0 the stop pushes.
         rail: Largest force of the rail's end on the trunk [N].
-        contact: Largest h kd / M of a leg that stands with friction under `implicitfast`; errors of
-            torques and load share are up to 0.12 times as large on a rail, up to 0.7 times on a
-            belt. See `contact.shortfall`.
+        contact: Largest RMS of what the foot's creep under `implicitfast` changes in a motor's
+            torque, as a part of the torque's RMS. See `dynamics.creep`.
         heat: Largest heat of a motor's winding if the motion goes on for good, as a part of what it
             bears. See `heat.heating`.
     """
@@ -68,7 +69,7 @@ class Guards(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     floor: float = 0.01
     stops: float = 1e-5
     rail: float = 0.0
-    contact: float = 0.5
+    contact: float = 0.025
     heat: float = 1.0
 
     def __post_init__(self) -> None:
@@ -134,8 +135,8 @@ class Evidence(NamedTuple):
         command: Steps from one command of the motors to the next.
         ranges: The ranges of the joints, see `stops.beyond`.
         trunk: Height of the trunk's lowest point above the hip frame's origin [m].
-        creeping: Damping of the servos that makes a foot creep [N m s/rad]; None under `discrete`,
-            and on a floor without friction.
+        footing: What holds a foot that creeps in its place; None under `discrete`, and on a floor
+            without friction.
         heating: Heat of the motors if the motion goes on for good; None where the servo's table
             does not describe the winding.
     """
@@ -150,7 +151,7 @@ class Evidence(NamedTuple):
     command: int
     ranges: Ranges
     trunk: float
-    creeping: float | None = None
+    footing: Footing | None = None
     heating: Heating | None = None
 
 
@@ -240,7 +241,7 @@ def _unsolved(run: Evidence) -> Found:
 
 def _leaned(run: Evidence) -> Found:
     # Nobody planned the force of a stop: the motion is not the one that was asked for.
-    q = np.stack([run.record[name] for name in JOINT_COLUMNS], axis=-1)
+    q = side_by_side(run.record, JOINT_COLUMNS)
     found = beyond(q, run.ranges)
     return _first_of(run, {f"joint {joint}": found[joint] for joint in found}, run.bounds.stops)
 
@@ -277,11 +278,25 @@ def _carrying_rail(run: Evidence) -> Found | None:
 
 
 def _creeping(run: Evidence) -> Found | None:
-    if "ground_z" not in run.record or run.creeping is None:
+    if run.footing is None:
         return None
-    found = contact.shortfall(run.leg, run.record, run.creeping)
     high = run.bounds.contact
-    return Found(None, high, None) if found is None else _highest(run, found, high)
+    record = run.record
+    steps = creep.Steps(
+        timestep=float(record["time"][0]),
+        q=side_by_side(record, JOINT_COLUMNS),
+        rate_A=record["theta_dot_A"],
+        ground=side_by_side(record, GROUND_COLUMNS),
+        torque=motors(record, "torque"),
+    )
+    try:
+        parts = creep.changes(run.leg, run.footing, steps)
+    except PoseError:
+        return Found(None, high, None)
+    value = float(np.sqrt((parts**2).mean(axis=0)).max())
+    # Where the RMS is above the bound, some step is, too.
+    above = np.abs(parts).max(axis=1) > high
+    return Found(value, high, _first(above, record["time"]) if value > high else None)
 
 
 def _highest(run: Evidence, values: Array, high: float) -> Found:
@@ -381,10 +396,10 @@ GUARDS = (
     Row(
         "contact",
         _creeping,
-        "the timestep is too long for a foot to stick under implicitfast, h kd / M above {}",
-        ", {} at worst: shorten it or use discrete",
-        1.0,
-        "",
+        "a foot that should stick crept under implicitfast, and changed a torque by more than {}",
+        ", by {} RMS: shorten the timestep or use discrete",
+        1e2,
+        "%",
     ),
     Row(
         "heat",

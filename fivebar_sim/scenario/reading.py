@@ -17,12 +17,12 @@ from fivebar_sim.errors import ArgumentError, ConfigError, unknown
 from fivebar_sim.files import tables
 from fivebar_sim.files.tables import Table
 from fivebar_sim.geometry import FiveBar
-from fivebar_sim.integrator import ON_GROUND, Sim
+from fivebar_sim.integrator import ON_BELT, ON_RAIL, Sim
 from fivebar_sim.metrics.catalogue import COOLING_KEYS, HEAT_KEYS, LIMIT_KEYS, LINE_KEYS
 from fivebar_sim.paths import FootPath
 from fivebar_sim.scenario import forces, scenes
 from fivebar_sim.scenario.forces import FootForce
-from fivebar_sim.scenario.scenes import Ground, Scene
+from fivebar_sim.scenario.scenes import Ground, Scene, Treadmill
 
 # It names a folder: Windows forbids these characters and cuts a blank off the end, and a leading
 # dot would hide it.
@@ -147,7 +147,8 @@ def sim(value: Any, scene: Scene, where: str) -> Sim:
     """Return the table [sim]; on a ground the default timestep is one that the integrator holds."""
     if isinstance(value, dict) and isinstance(scene, Ground):
         fine = value.get("integrator") == "implicitfast"
-        value = {"timestep": ON_GROUND, **value} if fine else value
+        holds = ON_BELT if isinstance(scene, Treadmill) else ON_RAIL
+        value = {"timestep": holds, **value} if fine else value
     return tables.convert(value, Sim, "sim", where)
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from fivebar_sim.arrays import Array, Bools
 from fivebar_sim.control import Feedback
 from fivebar_sim.dynamics import heat
+from fivebar_sim.dynamics.creep import Footing
 from fivebar_sim.kinematics.stops import Ranges
 from fivebar_sim.metrics import (
     branch,
@@ -86,7 +87,7 @@ def measure(scenario: Scenario, record: Mapping[str, Array], besides: Unrecorded
         command=scenario.command,
         ranges=besides.ranges,
         trunk=besides.trunk,
-        creeping=_creeping(scenario),
+        footing=_footing(scenario),
         heating=heated,
     )
 
@@ -107,16 +108,20 @@ def measure(scenario: Scenario, record: Mapping[str, Array], besides: Unrecorded
     )
 
 
-def _creeping(scenario: Scenario) -> float | None:
-    """Return the damping that makes a foot creep [N m s/rad]; None where it does not."""
+def _footing(scenario: Scenario) -> Footing | None:
+    """Return what holds the foot in its place; None where it does not creep."""
     scene = scenario.scene
-    sticks = isinstance(scene, Ground) and scene.friction > 0.0
-    if scenario.sim.integrator == "discrete" or not sticks:
+    if not isinstance(scene, Ground) or scene.friction == 0.0:
+        return None
+    if scenario.sim.integrator == "discrete":
         return None
     controller = scenario.controller
     # Under a torque drive kd is the controller's: the step does not know it as damping.
     drive = controller.drive if isinstance(controller, Feedback) else "position"
-    return scenario.servo.damping if drive == "position" else scenario.servo.back_emf
+    servo = scenario.servo
+    damping = servo.damping if drive == "position" else servo.back_emf
+    # The stiffness of a feedback controller is its own; it is taken to be the servo's.
+    return Footing(scene.friction, damping, servo.kp)
 
 
 def _heating(scenario: Scenario, record: Mapping[str, Array]) -> heat.Heating | None:
