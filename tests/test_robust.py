@@ -17,7 +17,7 @@ import rerun
 from shell import Shell
 
 from fivebar_sim import rollout
-from fivebar_sim.cli import memory, status
+from fivebar_sim.cli import memory, terminal
 from fivebar_sim.files import input_file
 from fivebar_sim.runs import directory, recording_file
 from fivebar_sim.scenario import scenario
@@ -236,11 +236,11 @@ def test_places_of_a_check_are_tried_before_its_runs(
 
 
 def test_a_line_is_short_and_obeyed_by_no_terminal() -> None:
-    assert status.one_line("two\nlines,\ta  gap") == "two lines, a gap"
-    assert status.one_line("red \x1b[31m, \u202eright, \udcff, é") == (
+    assert terminal.one_line("two\nlines,\ta  gap") == "two lines, a gap"
+    assert terminal.one_line("red \x1b[31m, \u202eright, \udcff, é") == (
         "red \\x1b[31m, \\u202eright, \\udcff, é"
     )
-    long = status.one_line("a" * 10_000 + "end")
+    long = terminal.one_line("a" * 10_000 + "end")
     assert long.startswith("aaa")
     assert long.endswith("aaaend")
     assert len(long) < 610

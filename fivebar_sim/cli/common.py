@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from tyro.conf import Positional, UseAppendAction, arg
 
-from fivebar_sim.cli import memory, plain
+from fivebar_sim.cli import memory, terminal
 from fivebar_sim.errors import ConfigError, FiveBarError
 
 if TYPE_CHECKING:
@@ -41,7 +41,7 @@ def plans_of(scenarios: Iterable[str], settings: Sequence[str]) -> list[Plan]:
 def screen(*, stderr: bool = False, quiet: bool = False):
     """Return a console for stdout or stderr; a closed pipe raises BrokenPipeError.
 
-    Text is made plain (see `plain`) before it is coloured; ":words:" do not become emoji.
+    Text is made plain (see `terminal.plain`) before it is coloured; ":words:" do not become emoji.
     """
     from rich.console import Console, ConsoleOptions, RenderableType
     from rich.segment import Segment
@@ -56,9 +56,9 @@ def screen(*, stderr: bool = False, quiet: bool = False):
         ) -> Iterator[Segment]:
             # Control segments are rich's own escape codes; all other text may come from a file.
             for part in super().render(renderable, options):
-                yield part if part.control else part._replace(text=plain.plain(part.text))
+                yield part if part.control else part._replace(text=terminal.plain(part.text))
 
-    stream = plain.unwrap(sys.stderr if stderr else sys.stdout)
+    stream = terminal.unwrap(sys.stderr if stderr else sys.stdout)
     return Screen(file=stream, quiet=quiet, emoji=False)
 
 

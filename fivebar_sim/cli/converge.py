@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 from tyro.conf import Positional, arg
 
 from fivebar_sim.cli.common import Settings, screen, spinner
-from fivebar_sim.cli.status import FAILED, say
+from fivebar_sim.cli.terminal import FAILED, say
 from fivebar_sim.errors import ArgumentError, DivergedError, FiveBarError
 
 if TYPE_CHECKING:

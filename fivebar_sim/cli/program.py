@@ -1,6 +1,6 @@
 """The program `fivebar`: parses arguments and calls a command.
 
-Exit status: 0 fine, 1 failed, 2 bad input; `status` has all of them.
+Exit status: 0 fine, 1 failed, 2 bad input; `terminal` has all of them.
 """
 
 from __future__ import annotations
@@ -15,8 +15,8 @@ from contextlib import contextmanager
 from importlib.metadata import version
 from typing import Any
 
-from fivebar_sim.cli import memory, plain, signals
-from fivebar_sim.cli.status import FAILED, INTERRUPTED, UNREAD, WRONG, say
+from fivebar_sim.cli import memory, signals, terminal
+from fivebar_sim.cli.terminal import FAILED, INTERRUPTED, UNREAD, WRONG, say
 from fivebar_sim.errors import DivergedError, FiveBarError
 
 COMMANDS = ("run", "check", "converge", "replay", "report", "render", "view", "workspace")
@@ -34,7 +34,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     # A name may have letters that the terminal's encoding lacks: they must not end the program.
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(errors="backslashreplace")
-    with plain.output(), _safe_children():
+    with terminal.output(), _safe_children():
         return _main(args)
 
 
@@ -100,7 +100,7 @@ def _call(args: list[str]) -> int:
     import tyro
 
     # The parser colours its messages and quotes the arguments in them.
-    plain.style(allowed=all(arg.isprintable() for arg in args))
+    terminal.style(allowed=all(arg.isprintable() for arg in args))
     config = (tyro.conf.FlagCreatePairsOff,)
     name = args[0] if args else ""
     # Without the parsers of all other commands, which take three times as long.
@@ -122,7 +122,7 @@ def _command(name: str) -> Callable[..., int]:
 
     @functools.wraps(function)
     def command(*args: Any, **options: Any) -> int:
-        plain.style(allowed=False)
+        terminal.style(allowed=False)
         return function(*args, **options)
 
     return command

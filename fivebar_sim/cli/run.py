@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 from tyro.conf import arg
 
 from fivebar_sim.cli.common import Scenarios, Settings, plans_of, screen, spinner
-from fivebar_sim.cli.status import FAILED, say
+from fivebar_sim.cli.terminal import FAILED, say
 from fivebar_sim.errors import ConfigError, DivergedError
 
 if TYPE_CHECKING:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from tyro.conf import Positional, arg
 
-from fivebar_sim.cli.status import say
+from fivebar_sim.cli.terminal import say
 
 if TYPE_CHECKING:
     from fivebar_sim.arrays import Array

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from shell import ELLIPSE, Said, Shell
 
-from fivebar_sim.cli import common, plain
+from fivebar_sim.cli import common, terminal
 from fivebar_sim.report import single
 
 ODD = [
@@ -22,12 +22,12 @@ ODD = [
 
 
 def test_what_cannot_be_seen_is_told_and_all_else_stays() -> None:
-    assert plain.plain("two\nlines, é, ╭, [red]x") == "two\nlines, é, ╭, [red]x"
-    assert plain.plain("\x1b[31m \x7f \x9b \u202e \u2028 \r \t") == (
+    assert terminal.plain("two\nlines, é, ╭, [red]x") == "two\nlines, é, ╭, [red]x"
+    assert terminal.plain("\x1b[31m \x7f \x9b \u202e \u2028 \r \t") == (
         "\\x1b[31m \\x7f \\x9b \\u202e \\u2028 \\r \\t"
     )
     for odd in "".join(ODD):
-        assert plain.plain(odd).isprintable()
+        assert terminal.plain(odd).isprintable()
 
 
 def _raw(text: str) -> set[str]:
@@ -98,16 +98,16 @@ def test_a_terminal_gets_our_colours_and_no_others(monkeypatch: pytest.MonkeyPat
 
     monkeypatch.setenv("TERM", "xterm")
     monkeypatch.delenv("NO_COLOR", raising=False)
-    terminal = Terminal()
-    monkeypatch.setattr(sys, "stdout", terminal)
-    with plain.output():
+    stream = Terminal()
+    monkeypatch.setattr(sys, "stdout", stream)
+    with terminal.output():
         common.screen().print("[green]ok[/green]", "\x1b[5mblinks")
         sys.stdout.write("\x1b[5mblinks\n")
-        plain.style(allowed=True)
+        terminal.style(allowed=True)
         sys.stdout.write("\x1b[1mours\n")
-        plain.style(allowed=False)
+        terminal.style(allowed=False)
         sys.stdout.write("\x1b[1mnot\n")
-    assert terminal.getvalue() == (
+    assert stream.getvalue() == (
         "\x1b[32mok\x1b[0m \\x1b\x1b[1m[\x1b[0m5mblinks\n\\x1b[5mblinks\n\x1b[1mours\n\\x1b[1mnot\n"
     )
-    assert sys.stdout is terminal
+    assert sys.stdout is stream

@@ -1,11 +1,23 @@
-"""Plain text for terminals: control characters are escaped in one place, whoever wrote them."""
+"""What the program tells a terminal and a shell: plain text, one-line messages, exit statuses.
+
+Control characters are escaped in one place, whoever wrote them. Quick to import.
+"""
 
 from __future__ import annotations
 
 import sys
 from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager, redirect_stderr, redirect_stdout
+from contextlib import ExitStack, contextmanager, redirect_stderr, redirect_stdout, suppress
 from typing import Any
+
+FAILED = 1
+WRONG = 2
+INTERRUPTED = 130
+UNREAD = 141
+
+HEAD = 400
+TAIL = 190
+"""Characters kept from the beginning and from the end of a message that is too long to read."""
 
 
 def plain(text: str) -> str:
@@ -61,3 +73,16 @@ def style(*, allowed: bool) -> None:
 def unwrap(stream: Any) -> Any:
     """Return the stream within a plain one, for a writer that escapes text and adds colours."""
     return stream.stream if isinstance(stream, Plain) else stream
+
+
+def say(error: BaseException | str) -> None:
+    """Print a message to stderr: one short line of plain text."""
+    # Where nobody can be told, as on a full disk, the status still counts.
+    with suppress(OSError):
+        print(f"fivebar: {one_line(str(error))}", file=sys.stderr, flush=True)  # noqa: T201
+
+
+def one_line(text: str) -> str:
+    """Return a text as one line, with unprintable characters escaped."""
+    line = plain(" ".join(text.split()))
+    return line if len(line) <= HEAD + TAIL + 10 else f"{line[:HEAD]} ... {line[-TAIL:]}"
