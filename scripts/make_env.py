@@ -150,8 +150,6 @@ def set_up(root: Path, kind: str, pip: str | None = None) -> None:
         if env.holds().get(lock) != mark:
             print("Adding what the tests need ...", flush=True)
             env.pip(*INSTALL, *FROM_LOCK, "-r", root / lock)
-            # Else a warning of the compiler, met while a test imports, would be that test's error.
-            call(env.python, "-m", "compileall", "-qq", "-j0", env.place / "lib")
             say_what_is_left_out()
             env.add(lock, mark)
 

@@ -25,5 +25,9 @@ find_python() { # prints the first Python that will do, or says why there is non
     return 1
 }
 
+# The set-up compiles nothing: what is imported is compiled at its first import, and kept even where the environment
+# forbids that. Each of the hundreds of Pythons that the tests start, and each pytest, would compile it all anew.
+unset PYTHONDONTWRITEBYTECODE
+
 python=$(find_python)
 "$python" scripts/make_env.py "$kind"

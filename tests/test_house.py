@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import ast
 import importlib
+import importlib.util
 import subprocess
 import sys
+import warnings
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
@@ -181,6 +183,33 @@ def test_package_never_imports_controllers() -> None:
         source = path.read_text(encoding="utf-8")
         found = set(imports(source)) if "fivebar_controllers" in source else set()
         assert "fivebar_controllers" not in found, name(path)
+
+
+def compile_strictly(source: str, file: str) -> None:
+    """Raise SyntaxError if the compiler warns."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        compile(source, file, "exec")
+
+
+def test_no_file_makes_the_compiler_warn() -> None:
+    for path in FILES:
+        compile_strictly(path.read_text(encoding="utf-8"), name(path))
+    for source in (r"x = '\d'", "assert (1, 'said')", "x = 1 is 1"):
+        with pytest.raises(SyntaxError):
+            compile_strictly(source, "odd.py")
+
+
+def test_warnings_of_the_compiler_are_no_error_of_an_import(tmp_path: Path) -> None:
+    """What others wrote is compiled at its first import, which may be in the midst of any test."""
+    odd = tmp_path / "odd_escape.py"
+    odd.write_text(r"x = '\d'", encoding="utf-8")
+    spec = importlib.util.spec_from_file_location("odd_escape", odd)
+    assert spec
+    assert spec.loader
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    assert module.x == r"\d"
 
 
 def test_scripts_and_tests_are_not_imported_by_what_ships() -> None:
