@@ -169,9 +169,22 @@ def check_offer(env: dict[str, str]) -> None:
 
 
 def pythons() -> list[str]:
-    """Return one Python of each version on the PATH that the project supports."""
+    """Return one Python of each version on the PATH that the project supports.
+
+    A name that starts none is left out: version managers have one for every Python installed.
+    """
     names = [f"python3.{minor}" for minor in range(11, 30)]
-    return [path for path in map(shutil.which, names) if path]
+    paths = [path for path in map(shutil.which, names) if path]
+    return [path for path in paths if starts(path)]
+
+
+def starts(python: str) -> bool:
+    """Return whether a program is a Python that can make environments; say so if not."""
+    done = subprocess.run([python, "-c", "import ensurepip, venv"], capture_output=True, text=True)
+    if done.returncode:
+        reason = (done.stderr.strip() or "no output").splitlines()[0]
+        print(f"{python} is left out: {reason}", flush=True)
+    return done.returncode == 0
 
 
 def main() -> int:
