@@ -87,6 +87,44 @@ CASES = (
     ),
     (
         "classic-ellipse",
+        # a spring without any damper, held for 1 ms: at 0.5 ms the same leg leaves its path
+        ("duration=0.75", "controller={name='pd',kd=0.0}"),
+        "feedback",
+        "guard feedback: held for its period the feedback is unstable, which the timestep hides: ",
+    ),
+    (
+        "minitaur-trot",
+        ("duration=0.75", "controller={name='pd',kp=49,kd=4e-4}", "servo={limit=0.4}"),
+        "feedback",
+        "guard feedback: held for its period the feedback is unstable, which the timestep hides: ",
+    ),
+    (
+        "classic-ellipse",
+        ("duration=0.75", "controller={name='computed_torque',kp=40000,kd=10}"),
+        "feedback",
+        "guard feedback: held for its period the feedback is unstable, which the timestep hides: ",
+    ),
+    (
+        "classic-ellipse",
+        (
+            "duration=0.75",
+            "controller={name='pd',kd=0.0005,period=0.002}",
+            "sim.timestep=0.002",
+        ),
+        "feedback",
+        "guard feedback: held for its period the feedback is unstable, which the timestep hides: ",
+    ),
+    (
+        "rail-hop",
+        (
+            "duration=0.5",
+            "controller={name='impedance',stiffness=[2000,2000],damping=[0.3,0.3]}",
+        ),
+        "feedback",
+        "guard feedback: held for its period the feedback is unstable, which the timestep hides: ",
+    ),
+    (
+        "classic-ellipse",
         ("guards.energy=1e-7", "duration=1"),
         "energy",
         "guard energy: more than 1e-05 % of the energy turned over was unaccounted",

@@ -57,6 +57,8 @@ class Guards(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
             torque, as a part of the torque's RMS. See `dynamics.creep`.
         heat: Largest heat of a motor's winding if the motion goes on for good, as a part of what it
             bears. See `heat.heating`.
+        feedback: Largest growth of errors between the commands of a feedback controller that the
+            timestep hides, as a power of ten: 1 is tenfold.
     """
 
     loop: float = 0.01
@@ -71,13 +73,23 @@ class Guards(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     rail: float = 0.0
     contact: float = 0.025
     heat: float = 1.0
+    feedback: float = 1.0
 
     def __post_init__(self) -> None:
         check_number("loop", self.loop, "", low=0.0)
         check_number("ground", self.ground, "", low=0.0)
         check_number("torque", self.torque, "", low=0.0, high=1.0)
         check_number("chatter", self.chatter, "", low=0.0, high=1.0)
-        for part in ("energy", "constraints", "step", "floor", "stops", "contact", "heat"):
+        for part in (
+            "energy",
+            "constraints",
+            "step",
+            "floor",
+            "stops",
+            "contact",
+            "heat",
+            "feedback",
+        ):
             check_number(part, getattr(self, part), "", low=0.0)
         check_number("rail", self.rail, "N", low=0.0)
 
@@ -139,6 +151,9 @@ class Evidence(NamedTuple):
             without friction.
         heating: Heat of the motors if the motion goes on for good; None where the servo's table
             does not describe the winding.
+        growth: Decades by which errors of the feedback would have grown by each step if commands
+            were held as long as a motor holds them, and which the timestep hides, (N,); None
+            without feedback.
     """
 
     bounds: Guards
@@ -153,6 +168,7 @@ class Evidence(NamedTuple):
     trunk: float
     footing: Footing | None = None
     heating: Heating | None = None
+    growth: Array | None = None
 
 
 class Found(NamedTuple):
@@ -252,6 +268,10 @@ def _overheated(run: Evidence) -> Found | None:
     high = run.bounds.heat
     used = run.heating.used
     return Found(used, high, run.heating.reaches(high))
+
+
+def _unstable(run: Evidence) -> Found | None:
+    return None if run.growth is None else _highest(run, run.growth, run.bounds.feedback)
 
 
 def _in_floor(run: Evidence) -> Found | None:
@@ -408,6 +428,15 @@ GUARDS = (
         ", {} at worst",
         1e2,
         "%",
+    ),
+    Row(
+        "feedback",
+        _unstable,
+        "held for its period the feedback is unstable, which the timestep hides: errors had grown "
+        "by more than 10^{}",
+        ", by 10^{} at worst: shorten the period or change the gains",
+        1.0,
+        "",
     ),
     Row(
         "ground",

@@ -47,6 +47,8 @@ class Unrecorded(NamedTuple):
         warnings: Number of MuJoCo's warnings.
         ranges: The ranges of the model's joints, see `stops.beyond`.
         trunk: Height of the trunk's lowest point above the hip frame's origin [m].
+        growth: Decades by which errors of the feedback would have grown by each step, unseen,
+            (N,); None without feedback. See `sampling.Stability.hidden`.
     """
 
     steps: energy.Steps
@@ -55,6 +57,7 @@ class Unrecorded(NamedTuple):
     warnings: int
     ranges: Ranges
     trunk: float
+    growth: Array | None = None
 
 
 def measure(scenario: Scenario, record: Mapping[str, Array], besides: Unrecorded) -> Measured:
@@ -89,6 +92,7 @@ def measure(scenario: Scenario, record: Mapping[str, Array], besides: Unrecorded
         trunk=besides.trunk,
         footing=_footing(scenario),
         heating=heated,
+        growth=besides.growth,
     )
 
     window = scenario.window

@@ -24,6 +24,7 @@ from fivebar_sim.metrics.columns import (
 )
 from fivebar_sim.metrics.tracking import left_path
 from fivebar_sim.scenario.scenes import Ground, Treadmill
+from fivebar_sim.simulation import sampling
 from fivebar_sim.simulation.measure import Unrecorded
 from fivebar_sim.simulation.plan import Plan
 from fivebar_sim.simulation.steps import States
@@ -96,7 +97,19 @@ def unrecorded(planned: Plan, states: States) -> Unrecorded:
         warnings=int(states.warnings[0]),
         ranges=_ranges(planned.model),
         trunk=_lowest(planned.model),
+        growth=_growth(planned, states),
     )
+
+
+def _growth(planned: Plan, states: States) -> Array | None:
+    """Return the decades by which errors of the feedback would have grown by each step, (N,)."""
+    q, v, _ = _joints(states)
+    force = states.ground[0]
+    stands = force[:, 1] > 0.0 if force.shape[1] else np.zeros(len(q), dtype=bool)
+    found = sampling.stability(
+        planned.scenario, planned.motion, q[:, MOTOR_JOINTS], v[:, MOTOR_JOINTS], stands
+    )
+    return None if found is None else found.hidden(states.time[0])
 
 
 def _lowest(built: mujoco.MjModel) -> float:
