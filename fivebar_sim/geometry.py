@@ -172,8 +172,10 @@ class FiveBar:
                 if getattr(self, key) is not None:
                     raise GeometryError(f"{key} needs mass beside it: four numbers [kg]")
             return
+
         if self.com is None and self.com_across is not None:
             raise GeometryError("com_across needs com beside it: four numbers [m]")
+
         for key in ("mass", "com", "com_across", "inertia"):
             if getattr(self, key) is not None:
                 object.__setattr__(self, key, _floats(key, getattr(self, key), 4))

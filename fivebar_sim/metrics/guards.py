@@ -35,6 +35,10 @@ DEGREES = float(np.degrees(1.0))
 """Of a radian."""
 
 
+RATIOS = ("energy", "constraints", "step", "floor", "stops", "contact", "heat", "feedback")
+"""Bounds without a unit that may be above 1."""
+
+
 class Guards(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """The bounds within which a run counts.
 
@@ -80,18 +84,10 @@ class Guards(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
         check_number("ground", self.ground, "", low=0.0)
         check_number("torque", self.torque, "", low=0.0, high=1.0)
         check_number("chatter", self.chatter, "", low=0.0, high=1.0)
-        for part in (
-            "energy",
-            "constraints",
-            "step",
-            "floor",
-            "stops",
-            "contact",
-            "heat",
-            "feedback",
-        ):
-            check_number(part, getattr(self, part), "", low=0.0)
         check_number("rail", self.rail, "N", low=0.0)
+
+        for part in RATIOS:
+            check_number(part, getattr(self, part), "", low=0.0)
 
 
 class Guard(Table, frozen=True):

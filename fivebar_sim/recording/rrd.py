@@ -23,7 +23,6 @@ from fivebar_sim.metrics.measured import Judged
 from fivebar_sim.recording import foot, ground, layout
 from fivebar_sim.recording import leg as scene
 from fivebar_sim.recording.check import PROPERTY
-from fivebar_sim.recording.identity import identity
 from fivebar_sim.recording.look import Look, looks
 from fivebar_sim.recording.plots import Series, series
 from fivebar_sim.recording.poses import (
@@ -37,6 +36,7 @@ from fivebar_sim.recording.poses import (
 )
 from fivebar_sim.recording.summary import summary
 from fivebar_sim.scenario.leg_words import leg_words
+from fivebar_sim.simulation.provenance import identity
 
 if TYPE_CHECKING:
     import rerun as rr

@@ -80,6 +80,7 @@ def markdown(checked: Sequence[Checked]) -> str:
     verdict = f"{failed} of {len(checked)} failed" if failed else f"all {len(checked)} pass"
     if unjudged:
         verdict = f"{failed} of {len(checked)} failed, {unjudged} not judged"
+
     lines = [f"## fivebar check: {verdict}", ""]
     for each in checked:
         failures = [("FAIL", line) for line in each.failures]

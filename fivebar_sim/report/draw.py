@@ -135,6 +135,7 @@ def shade_stance(ax: Axes, time: Array, stands: Bools) -> None:
     down = np.logical_or.reduceat(stands, ends[:-1])
     flips = np.flatnonzero(np.diff(np.concatenate([[False], down, [False]])))
     edges = np.concatenate([[0.0], time])[ends[flips]].reshape(-1, 2)
+
     spans = [(start, stop - start) for start, stop in edges.tolist()]
     ax.broken_barh(
         spans,

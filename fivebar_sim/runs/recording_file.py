@@ -12,8 +12,8 @@ from pathlib import Path
 
 from fivebar_sim.errors import ConfigError
 from fivebar_sim.recording import check, rrd
-from fivebar_sim.recording.identity import identity
 from fivebar_sim.runs import stored
+from fivebar_sim.simulation.provenance import identity
 
 RECORDING = "recording.rrd"
 

@@ -1,7 +1,9 @@
-"""Where a result comes from: versions, platform, solver settings, the state of the checkout."""
+"""Where a result comes from, and what tells it from every other result."""
 
 from __future__ import annotations
 
+import hashlib
+import json
 import platform
 import subprocess
 from functools import cache
@@ -9,6 +11,8 @@ from importlib.metadata import version
 from typing import Any
 
 from fivebar_sim.files import resources
+from fivebar_sim.metrics.columns import Record, digest
+from fivebar_sim.metrics.measured import Judged
 from fivebar_sim.scenario import Scenario
 
 
@@ -23,6 +27,12 @@ def provenance(scenario: Scenario) -> dict[str, Any]:
         "seed": scenario.sim.seed,
         "git": git_state(),
     }
+
+
+def identity(scenario: Scenario, record: Record, measured: Judged) -> str:
+    """Return what identifies a run: a checksum of all that a recording shows of it."""
+    said = json.dumps([scenario.table(), measured.table, digest(record)])
+    return hashlib.sha256(said.encode()).hexdigest()
 
 
 @cache

@@ -67,6 +67,7 @@ class Episodes:
         self._starts = starts
         self._targets = np.concatenate(list(task.targets().values()), axis=1)
         self._weights = {name: task.weight(name) for name in task.WEIGHTS}
+
         self.qpos = starts[:, 0].copy()
         self.qvel = np.zeros_like(starts[:, 0])
         self._count = np.zeros(self.size, dtype=np.int64)
