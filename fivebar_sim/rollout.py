@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -18,8 +18,8 @@ from fivebar_sim.scenario import Scenario
 from fivebar_sim.simulation import feedback, measure
 from fivebar_sim.simulation.plan import Plan, period_steps, plan
 from fivebar_sim.simulation.provenance import provenance
-from fivebar_sim.simulation.record import broken, columns, unrecorded
-from fivebar_sim.simulation.steps import States, Watch, check_states, simulate
+from fivebar_sim.simulation.recorder import Recorder
+from fivebar_sim.simulation.steps import States, Watch, simulated
 
 
 class Result(NamedTuple):
@@ -127,7 +127,7 @@ def execute(planned: Plan, watch: Watch | None = None) -> Result:
         planned: The plan.
         watch: Called with the states as they come.
     """
-    return _result(planned, _simulated([planned], 1, watch))
+    return _result(planned, _recorded([planned], 1, watch)[0])
 
 
 def run_all(plans: Sequence[Plan], nthread: int = 1) -> list[Result]:
@@ -149,46 +149,67 @@ def run_all(plans: Sequence[Plan], nthread: int = 1) -> list[Result]:
     # Groups mix the order of the plans; results go back to it at the end.
     results: dict[int, Result] = {}
     for members in groups.values():
-        states = _simulated([plans[i] for i in members], nthread)
-        for row, i in enumerate(members):
-            results[i] = _result(plans[i], states.rows(slice(row, row + 1)))
+        recorders = _recorded([plans[i] for i in members], nthread)
+        for i in members:
+            # Each is freed once it is measured.
+            results[i] = _result(plans[i], recorders.pop(0))
     return [results[i] for i in range(len(plans))]
 
 
-def _simulated(plans: Sequence[Plan], nthread: int, watch: Watch | None = None) -> States:
-    """Return the states of plans that may be simulated together."""
+def _recorded(plans: Sequence[Plan], nthread: int, watch: Watch | None = None) -> list[Recorder]:
+    """Return the records of plans that may be simulated together.
+
+    Raises:
+        DivergedError: A simulation broke down; says which, and when.
+    """
+    recorders = [Recorder(planned) for planned in plans]
+    try:
+        for states in _simulated(plans, nthread, watch):
+            for row, recorder in enumerate(recorders):
+                recorder.add(states.rows(slice(row, row + 1)))
+    except feedback.NoAnswerError as stopped:
+        raise recorders[stopped.row].broken(stopped) from stopped.__cause__
+
+    for recorder in recorders:
+        if recorder.error is not None:
+            raise recorder.broken(recorder.error)
+    return recorders
+
+
+def _simulated(plans: Sequence[Plan], nthread: int, watch: Watch | None = None) -> Iterator[States]:
+    """Yield the states of plans that may be simulated together, some steps after the other."""
     # Only a controller that waits for observations needs Python between the steps.
     if plans[0].setpoints is None:
         return feedback.steer(plans, nthread, watch)
-    return simulate(
+    return simulated(
         [p.model for p in plans],
         np.stack([p.start for p in plans]),
-        np.stack([p.ctrl for p in plans]),
+        plans[0].scenario.steps,
+        lambda rows: np.stack([p.commands(rows) for p in plans]),
         nthread,
         watch,
     )
 
 
-def _result(planned: Plan, states: States) -> Result:
+def _result(planned: Plan, recorder: Recorder) -> Result:
     scenario = planned.scenario
     try:
-        check_states(states, scenario.sim.timestep)
         _check_resolution(scenario)
     except DivergedError as error:
-        raise broken(planned, states, error) from None
+        raise recorder.broken(error) from None
 
-    record = columns(planned, states)
+    record = recorder.record
     # A foot that is gone leaves finite numbers behind, and metrics of nothing.
     lost = tracking.lost_path(scenario.leg, record)
     if lost is not None:
         far = f"it was {units.text(1e3 * scenario.leg.size, 'mm')} away from it at t = {lost:g} s"
-        raise broken(planned, states, DivergedError(far, lost))
+        raise recorder.broken(DivergedError(far, lost))
 
     try:
-        measured = measure.measure(scenario, record, unrecorded(planned, states))
+        measured = measure.measure(scenario, record, recorder.unrecorded)
     except ArgumentError as error:
         # Torques that no motor could have.
-        raise broken(planned, states, DivergedError(str(error), scenario.sim.timestep)) from error
+        raise recorder.broken(DivergedError(str(error), scenario.sim.timestep)) from error
 
     limits = judge(measured.table, scenario.limits)
     judged = with_verdict(measured, limits, provenance(scenario))

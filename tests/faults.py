@@ -133,7 +133,12 @@ def longer(**factors: float) -> Put:
 
 def commanded(change: Callable[[Array], Array]) -> Put:
     """Return what changes the commands on their way to MuJoCo."""
-    return around(Legs, "advance", lambda right, legs, ctrl: right(legs, change(ctrl)))
+
+    def put(patch: pytest.MonkeyPatch) -> None:
+        for name in ("advance", "once"):
+            around(Legs, name, lambda right, legs, ctrl: right(legs, change(ctrl)))(patch)
+
+    return put
 
 
 def swapped(ctrl: Array) -> Array:

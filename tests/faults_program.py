@@ -15,13 +15,13 @@ from fivebar_controllers.pd import Pd
 from fivebar_controllers.servo import Servo as Planned
 from msgspec.structs import replace as other
 
-from fivebar_sim import dynamics, kinematics, motion, rollout
+from fivebar_sim import dynamics, kinematics, motion
 from fivebar_sim.control.servo import Servo
 from fivebar_sim.control.step import ControlStep
 from fivebar_sim.metrics import ground, tracking
 from fivebar_sim.paths import Ellipse, Gait, base, csv, shapes
 from fivebar_sim.scenario import Scenario
-from fivebar_sim.simulation import feedback, record
+from fivebar_sim.simulation import asked, record
 from fivebar_sim.simulation import plan as planning
 
 Right = Callable[..., Any]
@@ -130,7 +130,7 @@ def columns(change: Callable[[dict[str, Any]], dict[str, Any]]) -> Put:
         found = right(*args, **keys)
         return found | change(found)
 
-    return around(rollout, "columns", wrong)
+    return around(record, "columns", wrong)
 
 
 def target_a_step_late(found: dict[str, Any]) -> dict[str, Any]:
@@ -240,7 +240,7 @@ CONTROLLERS = (
         "extended-gravity-hold",
         around(dynamics, "inverse", unloaded),
     ),
-    Fault("expected force forgotten", LANDING, around(feedback, "_references", unexpected)),
+    Fault("expected force forgotten", LANDING, around(asked, "_references", unexpected)),
 )
 STEP = (
     Fault("delay of the servo ignored", XL330, around(Servo, "latched", own(delay=0.0))),

@@ -16,7 +16,6 @@ from fivebar_sim.metrics.energy import Body, Steps
 from fivebar_sim.rollout import Plan, Result
 from fivebar_sim.scenario import Scenario
 from fivebar_sim.scenario.scenes import Ground, Payload, Rail
-from fivebar_sim.simulation.record import unrecorded
 
 PRESETS = tuple(resources.shipped("models/legs"))
 INTEGRATORS = ("discrete", "implicitfast")
@@ -37,9 +36,9 @@ def ran(name: str, *settings: str) -> Result:
 
 def acted(plan: Plan) -> tuple[Body, Result, Steps]:
     """Return what moved, the run, and what acted besides."""
-    states = rollout._simulated([plan], 1)
+    (recorder,) = rollout._recorded([plan], 1)
     body = Body(plan.scenario.leg, plan.scenario.payload, plan.scenario.trunk)
-    return body, rollout.execute(plan), unrecorded(plan, states).steps
+    return body, rollout.execute(plan), recorder.unrecorded.steps
 
 
 # MuJoCo's energies

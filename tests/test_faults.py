@@ -139,7 +139,9 @@ def test_other_rounding_is_no_alarm(
     right = rollout.run(scenario).metrics
     advance = Legs.advance
     begin = Legs.__init__
+    once = Legs.once
     monkeypatch.setattr(Legs, "advance", lambda legs, ctrl: advance(legs, off(ctrl, rng)))
+    monkeypatch.setattr(Legs, "once", lambda legs, ctrl: once(legs, off(ctrl, rng)))
     monkeypatch.setattr(
         Legs, "__init__", lambda legs, m, q, *rest: begin(legs, m, off(q, rng), *rest)
     )

@@ -24,7 +24,7 @@ from fivebar_sim.recording import live
 from fivebar_sim.recording import viewer as recording_viewer
 from fivebar_sim.runs import directory
 from fivebar_sim.scenario import Scenario
-from fivebar_sim.simulation import steps
+from fivebar_sim.simulation import feedback, steps
 
 RUNS = {
     "setpoints": ("classic-ellipse", ["duration=0.9"]),
@@ -45,7 +45,7 @@ def kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.setattr(rr.RecordingStream, "connect_grpc", keep)
     monkeypatch.setattr(steps, "WATCHED", 130)
     ticks = itertools.count(0.0, 0.05)  # [s]: a glance at every fourth period of the loop
-    monkeypatch.setattr(steps, "time", SimpleNamespace(monotonic=ticks.__next__))
+    monkeypatch.setattr(feedback, "time", SimpleNamespace(monotonic=ticks.__next__))
     return file
 
 

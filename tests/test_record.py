@@ -126,7 +126,7 @@ def test_saturation_is_counted_in_the_window_with_the_state_at_a_steps_end() -> 
     spring = 8.0 * (pair(result, "ctrl") - pair(result, "theta"))
     clips = np.abs(spring - kd * pair(result, "theta_dot")) > 0.006
     states = simulate(plan.model, plan.start[None], plan.ctrl[None])
-    np.testing.assert_array_equal(record.saturated(plan, states), clips)
+    np.testing.assert_array_equal(record.saturated(plan, record.Part(states, 0, plan.start)), clips)
     share = clips[plan.scenario.window].mean(axis=0)
     assert 0.05 < share.min() <= share.max() < 1.0
     assert result.metrics["load"]["saturated"] == dict(zip("AE", share.tolist(), strict=True))

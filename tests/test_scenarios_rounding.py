@@ -16,7 +16,7 @@ from fivebar_sim import rollout
 from fivebar_sim.arrays import Array
 from fivebar_sim.rollout import Plan, Result
 from fivebar_sim.scenario import Scenario
-from fivebar_sim.simulation.steps import Legs, States
+from fivebar_sim.simulation.steps import Legs
 
 PART = 1e-13
 """By how much every command is off: that many rad or N m, and that part of it."""
@@ -30,18 +30,20 @@ def outcome(result: Result) -> tuple[str, list[str]]:
 def nudged(plan: Plan, times: int) -> list[Result]:
     """Return what comes of a plan as it is, then some times with every command off.
 
-    All commands pass `Legs.advance`: those that are planned and those of a controller in the loop.
+    All commands pass `Legs.advance`, or `Legs.once` where a controller sends them one by one.
     """
     rng = np.random.default_rng(20240607)
     advance = Legs.advance
+    once = Legs.once
 
-    def off(legs: Legs, ctrl: Array) -> States:
+    def off(ctrl: Array) -> Array:
         noise = rng.uniform(-PART, PART, ctrl.shape)
         noise[0] = 0.0
-        return advance(legs, ctrl + noise * (1.0 + np.abs(ctrl)))
+        return ctrl + noise * (1.0 + np.abs(ctrl))
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(Legs, "advance", off)
+        patch.setattr(Legs, "advance", lambda legs, ctrl: advance(legs, off(ctrl)))
+        patch.setattr(Legs, "once", lambda legs, ctrl: once(legs, off(ctrl)))
         return rollout.run_all([plan] * (1 + times))
 
 

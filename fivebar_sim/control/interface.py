@@ -125,18 +125,19 @@ def find(name: str) -> type[Any]:
     return kind
 
 
-def answer_of(name: str, ask: Callable[[], Array]) -> NDArray[Any]:
+def answer_of(name: str, ask: Callable[..., Array], *question: object) -> NDArray[Any]:
     """Return what a controller answers, as an array of whatever it is.
 
     Args:
         name: The controller's, for the message.
-        ask: Calls the controller.
+        ask: Its method.
+        question: What it is given.
 
     Raises:
         ConfigError: It fails with anything but an error of this package, which passes.
     """
     try:
-        return np.asarray(ask())
+        return np.asarray(ask(*question))
     except FiveBarError:
         raise
     except Exception as error:  # a user's code may raise anything

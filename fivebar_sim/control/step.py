@@ -151,7 +151,7 @@ class ControlStep:
             command: (A, E) [rad or N m], (nsim, 2).
         """
         sent = self._bus.send(k, command)
-        if self._drive == "position":
+        if self._drive == "position" or self._back_emf == 0.0:
             return sent
         # The driver sits on the motor and knows its present rate, without the sensors' delay.
         return sent + self._back_emf * self._theta_dot[:, -1:]

@@ -26,7 +26,7 @@ from fivebar_sim.recording.relay import Relay
 from fivebar_sim.recording.summary import colours
 from fivebar_sim.scenario.scenes import Ground
 from fivebar_sim.simulation.plan import Plan
-from fivebar_sim.simulation.record import columns
+from fivebar_sim.simulation.record import Part, columns
 from fivebar_sim.simulation.steps import States, Watch
 
 if TYPE_CHECKING:
@@ -147,7 +147,7 @@ class _Sender:
         self._stream = stream
         self._room = _room(planned)
         self._begin = 0
-        self._last = None
+        self._before = planned.start
         self._queue: queue.SimpleQueue[States | None] = queue.SimpleQueue()
         self._error: Exception | None = None
         self._gone = False
@@ -199,16 +199,13 @@ class _Sender:
 
     def _send(self, states: States) -> None:
         """Send some steps."""
-        # The torque of a step needs the state before it: the last one of the part before.
-        known = 0 if self._last is None else 1
-        joined = states if self._last is None else States.joined([self._last, states])
-        record = columns(self._planned, joined, self._begin - known)
-        record = {name: column[known:] for name, column in record.items()}
+        record = columns(self._planned, Part(states, self._begin, self._before))
         # A single row does not tell the timestep, which the plots need.
         if len(record["time"]) > 1:
             self._show(record)
         self._begin += states.time.shape[1]
-        self._last = states.part(slice(-1, None))
+        # The torque of the next step needs the state before it.
+        self._before = states.qpos[0, -1]
 
     def _show(self, record: rrd.Record) -> None:
         planned = self._planned

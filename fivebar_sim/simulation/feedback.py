@@ -1,183 +1,206 @@
-"""Legs in the loop: their controllers are asked at every control step."""
+"""Legs in the loop: their controllers are asked at every control step.
+
+Whether all is well is looked for after every block of steps. Controllers have no memory, so that
+one may be asked a few times too often: what came after a fault is forgotten.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import NamedTuple, cast
+import time
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
 from fivebar_sim.arrays import Array
-from fivebar_sim.control import Feedback, Reference
-from fivebar_sim.control.interface import answer_of, is_numbers
-from fivebar_sim.control.servo import FARTHEST
-from fivebar_sim.control.step import ControlStep
-from fivebar_sim.errors import ConfigError, DivergedError, PoseError
-from fivebar_sim.motion import Motion
+from fivebar_sim.errors import DivergedError, FiveBarError, PoseError
+from fivebar_sim.model import without_log
+from fivebar_sim.simulation.asked import Asked, Latest, asked
 from fivebar_sim.simulation.plan import Plan, period_steps
-from fivebar_sim.simulation.record import broken
-from fivebar_sim.simulation.steps import States, Watch, check_states, is_broken, simulate_asking
+from fivebar_sim.simulation.steps import Legs, States, Watch, moving
+from fivebar_sim.simulation.taken import Periods, Singles, Taken
 
-MOTORS = slice(-4, None, 2)
-"""Where qpos and qvel have A and E."""
+BLOCK = 256
+"""Steps after which a block ends, with the control period in which it does."""
 
-
-class _Group(NamedTuple):
-    """Plans whose leg, servo, sensors, controller and payload are equal: one call answers all."""
-
-    rows: list[int]
-    plan: Plan
-    controller: Feedback
-    step: ControlStep
-    wanted: Reference
+GLANCE = 0.2
+"""Time between two moments at which whoever watches a run in the loop is shown its steps [s]."""
 
 
-def steer(plans: Sequence[Plan], nthread: int, watch: Watch | None) -> States:
-    """Return the states of plans with feedback controllers of one timestep, length and period.
+class NoAnswerError(DivergedError):
+    """A controller has no answer, or commands what no motor can follow.
+
+    Attributes:
+        row: The plan of the leg that it has none for.
+    """
+
+    def __init__(self, message: str, time: float, row: int) -> None:
+        super().__init__(message, time)
+        self.row = row
+
+
+def steer(plans: Sequence[Plan], nthread: int, watch: Watch | None) -> Iterator[States]:
+    """Yield the states of plans with feedback controllers of one timestep, length and period.
+
+    Some steps after the other; fewer than there are if a simulation broke down on the way.
 
     Raises:
         ConfigError: A controller that fails, or commands what is no finite (nsim, 2).
-        DivergedError: A controller that cannot answer, as where the loop would not close, or a
-            simulation that broke down on the way; says which.
+        NoAnswerError: A controller that cannot answer, as where the loop would not close.
     """
-    groups = _groups(plans)
-    every = groups[0].step.every
-    steps = plans[0].scenario.steps
-    h = plans[0].motion.timestep
+    loop = _Loop(plans, nthread, GLANCE if watch is not None else np.inf)
+    pending: list[States] = []
+    shown = time.monotonic()
 
-    def ask(so_far: States) -> Array | None:
-        k = so_far.time.shape[1]
-        new = slice(max(k - every, 0), k)
-        if is_broken(so_far, new):
-            return None
+    for states in loop.blocks():
+        yield states
+        if watch is None:
+            continue
+        pending.append(states)
+        if loop.over or time.monotonic() - shown >= GLANCE:
+            watch(States.joined(pending))
+            pending.clear()
+            shown = time.monotonic()
 
-        n = min(every, steps - k)
-        ctrl = np.empty((len(plans), n, plans[0].model.nu))
-        for row, plan in enumerate(plans):
-            ctrl[row, :, :-2] = plan.pushes[k : k + n]
 
-        for group in groups:
-            own = slice(None) if len(groups) == 1 else group.rows
-            group.step.moved(so_far.qpos[own, new, MOTORS], so_far.qvel[own, new, MOTORS])
-            try:
-                command = _command(group, k)
-            except PoseError as error:
-                row = group.rows[error.index[0] if error.index else 0]
-                why = f"controller {plans[row].scenario.controller_name!r} has no answer: {error}"
-                stopped = DivergedError(why, k * h)
-                raise broken(plans[row], so_far.rows([row]), stopped) from error
-            ctrl[group.rows, :, -2:] = group.step.send(k, command)
+class _Stop(NamedTuple):
+    """Why a block of steps cannot be whole.
+
+    Attributes:
+        steps: How many of its steps are right.
+        error: The error of the step after them.
+    """
+
+    steps: int
+    error: FiveBarError
+
+
+class _Loop:
+    """Legs and their controllers.
+
+    Args:
+        plans: The plans.
+        nthread: Threads; 0 is one for every processor.
+        patience: Time after which a block ends [s].
+    """
+
+    def __init__(self, plans: Sequence[Plan], nthread: int, patience: float) -> None:
+        self._plans = plans
+        self._patience = patience
+        start = np.stack([plan.start for plan in plans])
+        self._legs = Legs([plan.model for plan in plans], start, nthread)
+        self._every = period_steps(plans[0])
+        self._steps = plans[0].scenario.steps
+        self._ctrl = np.empty((len(plans), self._every, plans[0].model.nu))
+        self._pushed = plans[0].pushes.size > 0
+        self._asked = asked(plans)
+        self._asking = 0
+        self._k = 0
+
+    @property
+    def over(self) -> bool:
+        """Whether all steps were taken."""
+        return self._k >= self._steps
+
+    def blocks(self) -> Iterator[States]:
+        """Yield the states of one block after the other; see `steer`."""
+        latest: Latest | None = None
+        while not self.over:
+            begin = self._k
+            taken = self._room()
+            stopped = self._block(taken, latest)
+            latest = taken.latest() if self._k > begin else latest
+            states = taken.states() if self._k > begin else None
+            broken = None if states is None else self._broken(states)
+            refused = self._refused(begin, stopped)
+
+            # Of two faults the first is the cause of the second.
+            if refused is not None and (broken is None or refused.steps < broken):
+                if states is not None and refused.steps:
+                    yield states.part(slice(refused.steps))
+                raise refused.error
+            if states is not None:
+                yield states.part(slice(broken))
+            if broken is not None:
+                return
+
+    def _room(self) -> Taken:
+        """Return room for a block of steps."""
+        if self._every == 1 and self._legs.whole:
+            return Singles(self._legs, BLOCK)
+        return Periods(self._legs)
+
+    def _block(self, taken: Taken, latest: Latest | None) -> FiveBarError | None:
+        """Take a block of steps; return the error of a controller that ended it early."""
+        end = min(self._k + BLOCK, self._steps)
+        until = time.monotonic() + self._patience
+        try:
+            # What is not finite is found afterwards.
+            with without_log(), np.errstate(all="ignore"):
+                while self._k < end and time.monotonic() < until:
+                    taken.take(self._commands(latest))
+                    latest = taken.latest()
+                    self._k = min(self._k + self._every, self._steps)
+        except FiveBarError as error:
+            return error
+        return None
+
+    def _commands(self, latest: Latest | None) -> Array:
+        """Return the commands of the next control period, (nsim, n, nu)."""
+        k = self._k
+        ctrl = self._ctrl[:, : self._steps - k]
+        if self._pushed:
+            for row, plan in enumerate(self._plans):
+                ctrl[row, :, :-2] = plan.pushes[k : k + self._every]
+
+        for number, group in enumerate(self._asked):
+            self._asking = number
+            if len(self._asked) == 1:
+                ctrl[..., -2:] = group.sent(k, latest)
+            else:
+                own = None if latest is None else (latest[0][group.rows], latest[1][group.rows])
+                ctrl[group.rows, :, -2:] = group.sent(k, own)
         return ctrl
 
-    start = np.stack([plan.start for plan in plans])
-    states = simulate_asking([plan.model for plan in plans], start, steps, ask, nthread, watch)
-    if states.time.shape[1] < steps:  # the others' were ended with it
-        _raise_broken(plans, states)
+    def _broken(self, states: States) -> int | None:
+        """Return how many steps it took until a simulation broke down, in whole control periods.
 
-    return states
+        None if none did.
+        """
+        steps = states.time.shape[1]
+        good = moving(states).all(axis=0)
+        if not good.all():
+            return min((int(np.argmin(good)) // self._every + 1) * self._every, steps)
+        return steps if states.warnings.any() else None
 
+    def _refused(self, begin: int, stopped: FiveBarError | None) -> _Stop | None:
+        """Return the first command of the block that is none, or the error that ended it.
 
-def _raise_broken(plans: Sequence[Plan], states: States) -> None:
-    """Raise the error of the first plan whose simulation broke down."""
-    for row, plan in enumerate(plans):
-        own = states.rows([row])
-        try:
-            check_states(own, plan.motion.timestep)
-        except DivergedError as error:
-            raise broken(plan, own, error) from None
+        Args:
+            begin: The first step of the block.
+            stopped: That error, if any.
+        """
+        refusals = [(group.refusal(), group) for group in self._asked]
+        # The groups are asked in their order: of two at one step the first comes first.
+        found = [(each.after, each.error, group) for each, group in refusals if each is not None]
+        if found:
+            count, error, group = min(found, key=lambda each: each[0])
+            steps = count * self._every
+        elif stopped is not None:
+            steps = self._k - begin
+            group = self._asked[self._asking]
+            error = stopped
+        else:
+            return None
+        return _Stop(steps, self._named(error, group, begin + steps))
 
-
-def _groups(plans: Sequence[Plan]) -> list[_Group]:
-    """Return the plans by what they have in common."""
-    members: dict[tuple, list[int]] = {}
-    for row, plan in enumerate(plans):
-        s = plan.scenario
-        kind = (s.leg, s.servo, s.sensors, _hashable(s.controller), plan.motion.payload)
-        members.setdefault(kind, []).append(row)
-    return [_group([plans[row] for row in rows], rows) for rows in members.values()]
-
-
-def _hashable(controller: object) -> object:
-    """Return a controller, or of one that cannot be hashed, as a user's may be, which one it is."""
-    try:
-        hash(controller)
-    except TypeError:
-        return id(controller)
-    return controller
-
-
-def _group(plans: list[Plan], rows: list[int]) -> _Group:
-    plan = plans[0]
-    s = plans[0].scenario
-    controller = cast(Feedback, s.controller)
-    step = ControlStep(
-        s.servo,
-        s.sensors,
-        controller.drive,
-        timestep=plan.motion.timestep,
-        every=period_steps(plan),
-        steps=s.steps,
-        start=np.stack([p.motion.q[0, ::2] for p in plans]),
-        seeds=[p.scenario.sim.seed for p in plans],
-    )
-
-    return _Group(rows, plan, controller, step, _references([p.motion for p in plans]))
-
-
-def _references(motions: list[Motion]) -> Reference:
-    """Return the references of all steps, arrays of shape (nsim, N + 1, 2)."""
-    q, q_dot, q_ddot = (
-        np.stack([getattr(m, name)[:, ::2] for m in motions]) for name in ("q", "q_dot", "q_ddot")
-    )
-    foot, foot_dot, foot_ddot, force = (
-        np.stack([getattr(m, name) for m in motions])
-        for name in ("foot", "foot_dot", "foot_ddot", "force")
-    )
-    payload = np.array([m.payload for m in motions])
-    return Reference(foot, foot_dot, foot_ddot, q, q_dot, q_ddot, force, float(payload[0]))
-
-
-def _command(group: _Group, k: int) -> Array:
-    """Return what a controller commands at step k, checked, (nsim, 2).
-
-    Raises:
-        PoseError: It has no answer in a pose, or one that is not finite or no setpoint.
-        ConfigError: It fails otherwise, or answers with another shape.
-    """
-    s = group.plan.scenario
-    shape = (len(group.rows), 2)
-    arrays = [field[:, k] for field in group.wanted[:-1]]
-    wanted = Reference(*arrays, payload=group.wanted.payload)
-    name = s.controller_name
-    seen = group.step.observe(k)
-    command = answer_of(name, lambda: group.controller.command(s.leg, s.servo, seen, wanted))
-    if not is_numbers(command, shape):
-        raise ConfigError(
-            f"controller {name!r} must command numbers of shape {shape}, "
-            f"got {command.dtype} of shape {command.shape}"
-        )
-
-    if not np.isfinite(command).all():
-        bad = ~np.isfinite(command).all(axis=1)
-        raise PoseError("its command is not finite", (int(np.argmax(bad)),))
-
-    if group.controller.drive == "position":
-        _check_near(command, seen.theta)
-    return command
-
-
-def _check_near(command: Array, theta: Array) -> None:
-    """Raise if a setpoint is farther from the angle that is seen than a servo can mean.
-
-    Raises:
-        PoseError: Says of which motor, and how far.
-    """
-    away = np.abs(command - theta)
-    row, motor = np.unravel_index(int(np.argmax(away)), away.shape)
-    name = "AE"[motor]
-    if not away[row, motor] <= FARTHEST:
-        raise PoseError(
-            f"its setpoints must be within {FARTHEST:.4g} rad (half a turn) of the motors' angles, "
-            f"got one for {name} that is {away[row, motor]:.4g} rad away",
-            (int(row),),
-        )
+    def _named(self, error: FiveBarError, group: Asked, k: int) -> FiveBarError:
+        """Return an error of a controller at step k, with its leg if it has no answer for it."""
+        if not isinstance(error, PoseError):
+            return error
+        row = group.rows[error.index[0] if error.index else 0]
+        h = self._plans[row].motion.timestep
+        why = f"controller {group.name!r} has no answer: {error}"
+        found = NoAnswerError(why, k * h, row)
+        found.__cause__ = error
+        return found

@@ -47,9 +47,13 @@ class Plan(NamedTuple):
     @property
     def ctrl(self) -> Array:
         """The commands of every step in MuJoCo's order, (N, nu); not with a feedback controller."""
+        return self.commands(slice(None))
+
+    def commands(self, steps: slice) -> Array:
+        """Return the commands of some steps in MuJoCo's order, (n, nu); see `ctrl`."""
         assert self.setpoints is not None
         # The motors are a model's last two actuators.
-        return np.concatenate([self.pushes, self.setpoints], axis=1)
+        return np.concatenate([self.pushes[steps], self.setpoints[steps]], axis=1)
 
 
 def plan(scenario: Scenario) -> Plan:
@@ -132,9 +136,7 @@ def _setpoints(scenario: Scenario, controller: Setpoints, wanted: Motion) -> Arr
     name = scenario.controller_name
     shape = (scenario.steps, 2)
     integrator = scenario.sim.integrator
-    ctrl = answer_of(
-        name, lambda: controller.setpoints(scenario.leg, scenario.servo, wanted, integrator)
-    )
+    ctrl = answer_of(name, controller.setpoints, scenario.leg, scenario.servo, wanted, integrator)
     if not is_numbers(ctrl, shape) or not np.isfinite(ctrl).all():
         raise ConfigError(
             f"controller {name!r} must plan finite setpoints [rad] of shape {shape}, "

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import mujoco
 import numpy as np
 
@@ -9,9 +11,7 @@ from fivebar_sim import kinematics
 from fivebar_sim.arrays import Array, Bools
 from fivebar_sim.control.servo import Drive, applied_torque
 from fivebar_sim.control.servo import saturated as clipped
-from fivebar_sim.errors import DivergedError
 from fivebar_sim.kinematics.stops import Ranges
-from fivebar_sim.metrics import energy
 from fivebar_sim.metrics.columns import (
     BELT_COLUMN,
     COLUMNS,
@@ -21,41 +21,50 @@ from fivebar_sim.metrics.columns import (
     MOTOR_JOINTS,
     RAIL_COLUMN,
     Record,
+    motors,
 )
-from fivebar_sim.metrics.tracking import left_path
 from fivebar_sim.scenario.scenes import Ground, Treadmill
 from fivebar_sim.simulation import sampling
-from fivebar_sim.simulation.measure import Unrecorded
 from fivebar_sim.simulation.plan import Plan
 from fivebar_sim.simulation.steps import States
 
 
-def columns(planned: Plan, states: States, begin: int = 0) -> Record:
-    """Return the record: row k is the state at t = (k + 1) h, with the torques of the step to it.
+class Part(NamedTuple):
+    """Some steps of one simulation that follow each other.
+
+    Attributes:
+        states: The states after each of them.
+        begin: Index of the first.
+        before: qpos before it, (nq,).
+    """
+
+    states: States
+    begin: int
+    before: Array
+
+
+def columns(planned: Plan, part: Part) -> Record:
+    """Return rows of the record: row k is the state at t = (k + 1) h, with the torques to it.
 
     Args:
         planned: The plan that was simulated.
-        states: The states of this one simulation, all steps or some.
-        begin: Index of the first of these states. If above 0, the state before it is not known:
-            its torque is computed as if the leg had been in the planned pose.
+        part: Its steps, all or some.
     """
     leg = planned.scenario.leg
     wanted = planned.motion
-    q, v, ctrl = _joints(states)
+    begin = part.begin
+    q, v, ctrl = _joints(part.states)
     # Foot and gap from qpos itself: MuJoCo's site positions are those before the step.
     points = kinematics.chain_points(leg, q)
     # The plan starts at t = 0, the states one step later.
     rows = slice(begin + 1, begin + len(q) + 1)
     target = wanted.foot[rows]
     gap = points.C_right - points.C_left
-    torque = _torque(planned, states, begin)
+    torque = _torque(planned, part)
     vectors = [*target.T, *points.F.T, *q.T, *v.T, *ctrl.T, *torque.T]
     values = [wanted.time[rows], *vectors, np.hypot(gap[:, 0], gap[:, 1])]
     record = dict(zip(COLUMNS, values, strict=True))
-    record |= _surroundings(planned, states, begin)
-
-    # Columns of a matrix are strided views: copied, each lies in one piece of memory of its own.
-    return {name: np.ascontiguousarray(column) for name, column in record.items()}
+    return record | _surroundings(planned, part)
 
 
 def _joints(states: States) -> tuple[Array, Array, Array]:
@@ -68,51 +77,32 @@ def _drive(planned: Plan) -> Drive:
     return getattr(planned.scenario.controller, "drive", "position")
 
 
-def _torque(planned: Plan, states: States, begin: int) -> Array:
+def _torque(planned: Plan, part: Part) -> Array:
     """Return the torque that each motor gave in each step [N m], (N, 2)."""
     scenario = planned.scenario
-    steps = _steps(planned, states, begin)
+    steps = _steps(part)
     return applied_torque(scenario.servo, scenario.sim.integrator, *steps, _drive(planned))
 
 
-def _steps(planned: Plan, states: States, begin: int = 0) -> tuple[Array, Array, Array, Array]:
-    """Return commands, motor angles before each step, and angles and rates after it, (N, 2) each.
-
-    The first step begins in the planned pose.
-    """
-    q, v, ctrl = _joints(states)
-    before = np.concatenate([planned.motion.q[begin : begin + 1], q[:-1]])
+def _steps(part: Part) -> tuple[Array, Array, Array, Array]:
+    """Return commands, motor angles before steps, and angles and rates after them, (n, 2) each."""
+    q, v, ctrl = _joints(part.states)
+    before = np.concatenate([part.before[None, -4:], q[:-1]])
     return ctrl, before[:, MOTOR_JOINTS], q[:, MOTOR_JOINTS], v[:, MOTOR_JOINTS]
 
 
-def unrecorded(planned: Plan, states: States) -> Unrecorded:
-    """Return the per-step data that the metrics need and the record leaves out."""
-    # The motors are the last two actuators; the others push the foot.
-    pushes = states.ctrl[0, :, :-2]
-    limit = planned.model.opt.iterations
-    return Unrecorded(
-        steps=energy.Steps(planned.start, states.constraint[0], pushes),
-        saturated=saturated(planned, states),
-        unsolved=states.iterations[0] >= limit,
-        warnings=int(states.warnings[0]),
-        ranges=_ranges(planned.model),
-        trunk=_lowest(planned.model),
-        growth=_growth(planned, states),
-    )
-
-
-def _growth(planned: Plan, states: States) -> Array | None:
+def growth(planned: Plan, record: Record) -> Array | None:
     """Return the decades by which errors of the feedback would have grown by each step, (N,)."""
-    q, v, _ = _joints(states)
-    force = states.ground[0]
-    stands = force[:, 1] > 0.0 if force.shape[1] else np.zeros(len(q), dtype=bool)
-    found = sampling.stability(
-        planned.scenario, planned.motion, q[:, MOTOR_JOINTS], v[:, MOTOR_JOINTS], stands
-    )
-    return None if found is None else found.hidden(states.time[0])
+    angles = motors(record, "theta")
+    rates = motors(record, "theta_dot")
+    stands = np.zeros(len(angles), dtype=bool)
+    if "ground_z" in record:
+        stands = record["ground_z"] > 0.0
+    found = sampling.stability(planned.scenario, planned.motion, angles, rates, stands)
+    return None if found is None else found.hidden(record["time"])
 
 
-def _lowest(built: mujoco.MjModel) -> float:
+def lowest(built: mujoco.MjModel) -> float:
     """Return the height of the lowest point of hip and trunk above the hip frame's origin [m]."""
     # The trunk of a rail has its origin in the hip's; both carry boxes alone.
     bodies = [i for i in range(built.nbody) if built.body(i).name in ("hip", "trunk")]
@@ -126,7 +116,7 @@ def _lowest(built: mujoco.MjModel) -> float:
     return min(below)
 
 
-def _ranges(built: mujoco.MjModel) -> Ranges:
+def ranges(built: mujoco.MjModel) -> Ranges:
     """Return the ranges of the hinges that have stops, and that of the angle at C."""
     ids = {joint: built.joint(joint).id for joint in JOINTS}
     limited = {joint: built.jnt_range[i] for joint, i in ids.items() if built.jnt_limited[i]}
@@ -136,16 +126,18 @@ def _ranges(built: mujoco.MjModel) -> Ranges:
     return {joint: (float(low), float(high)) for joint, (low, high) in limited.items()}
 
 
-def saturated(planned: Plan, states: States) -> Bools:
+def saturated(planned: Plan, part: Part) -> Bools:
     """Return whether the torque limit clipped each motor in each step, (N, 2)."""
     scenario = planned.scenario
-    steps = _steps(planned, states)
+    steps = _steps(part)
     return clipped(scenario.servo, scenario.sim.integrator, *steps, _drive(planned))
 
 
-def _surroundings(planned: Plan, states: States, begin: int) -> Record:
+def _surroundings(planned: Plan, part: Part) -> Record:
     """Return the columns of hip, ground and belt, where the scene has them."""
     scene = planned.scenario.scene
+    states = part.states
+    begin = part.begin
     steps = states.time.shape[1]
     record: Record = {}
 
@@ -153,7 +145,7 @@ def _surroundings(planned: Plan, states: States, begin: int) -> Record:
         hip = (states.qpos[0, :, 0], states.qvel[0, :, 0])
         record |= dict(zip(HIP_COLUMNS, hip, strict=True))
         record |= dict(zip(GROUND_COLUMNS, states.ground[0].T, strict=True))
-        record[RAIL_COLUMN] = _rail_end(planned, states, begin)
+        record[RAIL_COLUMN] = _rail_end(planned, part)
 
     if isinstance(scene, Treadmill):
         record[BELT_COLUMN] = (
@@ -162,25 +154,16 @@ def _surroundings(planned: Plan, states: States, begin: int) -> Record:
     return record
 
 
-def _rail_end(planned: Plan, states: States, begin: int) -> Array:
+def _rail_end(planned: Plan, part: Part) -> Array:
     """Return the force of the rail's lower end on the trunk in each step [N], (N,)."""
     slide = planned.model.joint("hip_z")
+    states = part.states
     height = states.qpos[0, :, 0]
     if not planned.model.jnt_limited[slide.id]:
         return np.zeros_like(height)
 
     # Floor and rail's end are all that the world does to leg and trunk along z; the rest is inside.
     force = states.constraint[0, :, 0] - states.ground[0, :, 1]
-    first = planned.start[:1] if begin == 0 else height[:1]
-    before = np.concatenate([first, height[:-1]])
+    before = np.concatenate([part.before[:1], height[:-1]])
     # The end acts in steps that begin below it; elsewhere the difference is rounding.
     return np.where(before < slide.range[0], force, 0.0)
-
-
-def broken(planned: Plan, states: States, error: DivergedError) -> DivergedError:
-    """Return the error of a run that broke down: when the foot left its path, and the cause."""
-    # The states of a breakdown may overflow; such an angle counts as off the path.
-    with np.errstate(all="ignore"):
-        left = left_path(planned.scenario.leg, columns(planned, states), error.time)
-    name = planned.scenario.name
-    return DivergedError(f"{name}: the foot left its path at t = {left:g} s; {error}", left)

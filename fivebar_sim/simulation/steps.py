@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
 from mujoco.batch import Batch
+from numpy.typing import NDArray
 
 from fivebar_sim.arrays import Array, Bools
 from fivebar_sim.errors import ArgumentError, DivergedError
@@ -25,9 +25,6 @@ CHUNK = 50_000
 
 WATCHED = 10_000
 """Steps of a run whose commands are known that whoever watches is shown at once: about 0.06 s."""
-
-GLANCE = 0.2
-"""Time between two moments at which whoever watches a run in the loop is shown its steps [s]."""
 
 Watch = Callable[["States"], None]
 """Is shown the states of some steps after the other while they are simulated."""
@@ -93,15 +90,18 @@ class Legs:
         nthread: int = 1,
     ) -> None:
         shared = isinstance(models, mujoco.MjModel)
-        first: Any = models if shared else models[0]
+        stepped = [models] if shared else list(models)
+        first = stepped[0]
         if qpos.ndim != 2 or qpos.shape[1] != first.nq:
             raise ArgumentError(f"qpos must have shape (nsim, {first.nq}), got {qpos.shape}")
         self._batch = Batch(first, len(qpos), nthread)
         if not shared:
-            self._batch.set_models(list(models))
+            self._batch.set_models(stepped)
         self._batch.qpos = qpos
-        self._clipping = Clipping.of([first] * len(qpos) if shared else models)
+        self._ctrl = self._batch.bind("ctrl")
+        self._clipping = Clipping.of(stepped * len(qpos) if shared else stepped)
         self._sizes = first.nq, first.nv, first.nu
+
         ground = mujoco.mj_name2id(first, mujoco.mjtObj.mjOBJ_SENSOR, "ground")
         self._ground = None if ground < 0 else int(first.sensor_adr[ground]) + 1  # after "found"
 
@@ -114,7 +114,7 @@ class Legs:
         Raises:
             ArgumentError: Commands of another shape, or that are not finite.
         """
-        nq, nv, nu = self._sizes
+        nu = self._sizes[2]
         nsim = self._batch.nsim
         if ctrl.ndim != 3 or ctrl.shape[::2] != (nsim, nu):
             raise ArgumentError(f"ctrl must have shape ({nsim}, N, {nu}), got {ctrl.shape}")
@@ -128,33 +128,65 @@ class Legs:
             else:
                 out = rollout(self._batch, self._clipping, ctrl, record)
 
-        state = out[STATE]
-        start = self._ground
-        ground = state[..., :0]
-        if start is not None:
-            ground = out["sensordata"][..., [start, start + 2]]
+        # A step that keeps a torque limit may have been sent another command.
+        arrays = [out[STATE], *(out[name] for name in record[1:])]
+        return self.states(arrays, ctrl.copy(), self._batch.warning)
 
+    def states(self, arrays: Sequence[Any], ctrl: Array, warnings: NDArray[Any]) -> States:
+        """Return states from what `live` lists, of some steps each, (nsim, n, ...).
+
+        Args:
+            arrays: What MuJoCo has after each step.
+            ctrl: The commands of each step, (nsim, n, nu).
+            warnings: (last info, count) of each kind of its warnings so far, (nsim, kinds, 2).
+        """
+        state, constraint, iterations, *sensors = arrays
+        # The state begins with the time, then come qpos and qvel.
+        nq, nv, _ = self._sizes
+        start = self._ground
+        ground = state[..., :0] if start is None else sensors[0][..., [start, start + 2]]
         return States(
             time=state[..., 0],
             qpos=state[..., 1 : 1 + nq],
             qvel=state[..., 1 + nq : 1 + nq + nv],
-            # A step that keeps a torque limit may have been sent another command.
-            ctrl=np.ascontiguousarray(ctrl),
+            ctrl=ctrl,
             ground=ground,
-            constraint=out["qfrc_constraint"],
-            iterations=out["solver_niter"].max(axis=-1),  # over the islands
-            warnings=self._batch.warning[..., 1].sum(axis=1),  # (last info, count) of each kind
+            constraint=constraint,
+            iterations=iterations.max(axis=-1),  # over the islands
+            warnings=warnings[..., 1].sum(axis=1),
         )
 
-    def nothing(self, steps: int) -> States:
-        """Return room for the states of some steps, to be filled."""
-        nq, nv, nu = self._sizes
-        nsim = self._batch.nsim
-        sizes = (nq, nv, nu, 0 if self._ground is None else 2, nv)
-        fields = (np.empty((nsim, steps, size)) for size in sizes)
-        iterations: Any = np.empty((nsim, steps), dtype=np.int32)
-        warnings: Any = np.zeros(nsim, dtype=np.int64)
-        return States(np.empty((nsim, steps)), *fields, iterations=iterations, warnings=warnings)
+    @property
+    def nu(self) -> int:
+        """Number of commands of a leg."""
+        return self._sizes[2]
+
+    @property
+    def whole(self) -> bool:
+        """Whether no torque limit may make a step be taken again, so that `once` is right."""
+        return self._clipping is None
+
+    def live(self) -> list[NDArray[Any]]:
+        """Return what MuJoCo has now: state, constraint, iterations, any sensors, (nsim, ...).
+
+        They are those of the simulations themselves, and change with every step. The state ends
+        with the commands.
+        """
+        names = STEP if self._ground is None else (*STEP, "sensordata")
+        # The parts of the state come in the order of their bits.
+        command = mujoco.mjtState.mjSTATE_CTRL.value
+        before = mujoco.mjtState.mjSTATE_INTEGRATION.value & (2 * command - 1)
+        size = mujoco.mj_stateSize(self._batch.model, before)
+        return [self._batch.state[:, :size], *(self._batch.bind(name) for name in names)]
+
+    def warned(self) -> NDArray[Any]:
+        """Return MuJoCo's warnings of each simulation as they are now, (nsim, kinds, 2)."""
+        return self._batch.warning
+
+    def once(self, ctrl: Array) -> None:
+        """Take one step with finite commands, (nsim, nu)."""
+        self._ctrl[:] = ctrl
+        self._batch.step()
 
 
 def simulate(
@@ -176,67 +208,40 @@ def simulate(
     Raises:
         ArgumentError: Shapes that do not fit, or commands that are not finite.
     """
-    legs = Legs(models, qpos, nthread)
-    parts = []
     if ctrl.ndim != 3:
-        legs.advance(ctrl)
-    for part in _chunks(ctrl, CHUNK // max(len(ctrl), 1) if watch is None else WATCHED):
-        parts.append(legs.advance(part))
-        if watch is not None:
-            watch(parts[-1])
-    return States.joined(parts)
+        Legs(models, qpos, nthread).advance(ctrl)
+    parts = simulated(models, qpos, ctrl.shape[1], lambda rows: ctrl[:, rows], nthread, watch)
+    return States.joined(list(parts))
 
 
-def _chunks(ctrl: Array, length: int) -> Iterator[Array]:
-    """Yield some steps after the other, so that Ctrl-C is heard in between."""
-    length = max(1, length)
-    for start in range(0, ctrl.shape[1], length):
-        yield ctrl[:, start : start + length]
-
-
-def simulate_asking(
+def simulated(
     models: mujoco.MjModel | Sequence[mujoco.MjModel],
     qpos: Array,
     steps: int,
-    ask: Callable[[States], Array | None],
+    ctrl: Callable[[slice], Array],
     nthread: int = 1,
     watch: Watch | None = None,
-) -> States:
-    """Return the states of legs whose commands depend on how they move.
+) -> Iterator[States]:
+    """Yield the states of some steps after the other, so that Ctrl-C is heard in between.
 
     Args:
-        models: One model for all simulations, or one each (of one structure and timestep).
+        models: As in `simulate`.
         qpos: Start poses, (nsim, nq).
         steps: N.
-        ask: Given the states so far, none at first, returns the commands of the next n steps,
-            (nsim, n, nu), n as it likes; None ends the run early.
-        nthread: Threads; 0 is one for every processor.
-        watch: Is shown the states as they come.
+        ctrl: Returns the commands of some steps, (nsim, n, nu).
+        nthread: Threads.
+        watch: Is shown the states.
 
     Raises:
-        ArgumentError: Shapes that do not fit, or commands that are not finite.
+        ArgumentError: As in `simulate`.
     """
     legs = Legs(models, qpos, nthread)
-    states = legs.nothing(steps)
-    k = 0
-    shown = 0
-    last = time.monotonic()
-
-    while k < steps:
-        ctrl = ask(states.part(slice(k)))
-        if ctrl is None:
-            break
-        part = legs.advance(ctrl[:, : steps - k])
-        n = part.time.shape[1]
-        for whole, piece in zip(states[:-1], part[:-1], strict=True):
-            whole[:, k : k + n] = piece
-        states = states._replace(warnings=part.warnings)
-        k = k + n
-        if watch is not None and (time.monotonic() - last >= GLANCE or k == steps):
-            watch(states.part(slice(shown, k)))
-            shown = k
-            last = time.monotonic()
-    return states.part(slice(k))
+    length = WATCHED if watch is not None else max(1, CHUNK // max(len(qpos), 1))
+    for start in range(0, steps, length):
+        states = legs.advance(ctrl(slice(start, min(start + length, steps))))
+        if watch is not None:
+            watch(states)
+        yield states
 
 
 def check_states(states: States, timestep: float) -> None:
@@ -247,15 +252,9 @@ def check_states(states: States, timestep: float) -> None:
     Raises:
         DivergedError: With the time of the first bad step.
     """
-    bad = ~_sound(states, timestep)
-    if bad.any():
-        k = int(np.argmax(bad.any(axis=0)))
-        raise DivergedError(
-            f"the simulation broke down at t = {(k + 1) * timestep:g} s: joint rates beyond "
-            f"{SPEED_LIMIT:g} rad/s or a state that is not finite; try a timestep below "
-            f"{timestep:g} s or softer gains",
-            (k + 1) * timestep,
-        )
+    error = fault(states, timestep)
+    if error is not None:
+        raise error
 
     if states.warnings.any():
         raise DivergedError(
@@ -264,18 +263,38 @@ def check_states(states: States, timestep: float) -> None:
         )
 
 
+def fault(states: States, timestep: float, begin: int = 0) -> DivergedError | None:
+    """Return the error of states that are not finite, too fast, or late, if some are.
+
+    Args:
+        states: The states of some steps.
+        timestep: h [s].
+        begin: Index of the first of these steps.
+    """
+    bad = ~_sound(states, timestep, begin)
+    if not bad.any():
+        return None
+    k = begin + int(np.argmax(bad.any(axis=0)))
+    return DivergedError(
+        f"the simulation broke down at t = {(k + 1) * timestep:g} s: joint rates beyond "
+        f"{SPEED_LIMIT:g} rad/s or a state that is not finite; try a timestep below "
+        f"{timestep:g} s or softer gains",
+        (k + 1) * timestep,
+    )
+
+
 def is_broken(states: States, steps: slice) -> bool:
     """Return whether a simulation broke down in some of the steps."""
-    return not (_moves(states.part(steps)).all() and not states.warnings.any())
+    return not (moving(states.part(steps)).all() and not states.warnings.any())
 
 
-def _sound(states: States, timestep: float) -> Bools:
-    """Return which states, from the first step on, are finite, slow enough and on time."""
-    steps = np.arange(1, states.time.shape[1] + 1)
-    return (np.abs(states.time - steps * timestep) < 0.5 * timestep) & _moves(states)
+def _sound(states: States, timestep: float, begin: int) -> Bools:
+    """Return which states are finite, slow enough and on time."""
+    steps = np.arange(begin + 1, begin + states.time.shape[1] + 1)
+    return (np.abs(states.time - steps * timestep) < 0.5 * timestep) & moving(states)
 
 
-def _moves(states: States) -> Bools:
+def moving(states: States) -> Bools:
     """Return which states are finite and slow enough."""
     # NaN and inf are not below the limit either.
     return np.isfinite(states.qpos).all(-1) & (np.abs(states.qvel).max(-1) < SPEED_LIMIT)

@@ -1,0 +1,110 @@
+"""The record of a run, made of its states as they come: the states themselves are not kept."""
+
+from __future__ import annotations
+
+from contextlib import nullcontext
+
+import numpy as np
+
+from fivebar_sim.arrays import Array, Bools
+from fivebar_sim.errors import DivergedError
+from fivebar_sim.metrics import energy
+from fivebar_sim.metrics.columns import Record
+from fivebar_sim.metrics.tracking import left_path
+from fivebar_sim.simulation import record
+from fivebar_sim.simulation.measure import Unrecorded
+from fivebar_sim.simulation.plan import Plan
+from fivebar_sim.simulation.steps import States, fault
+
+ROWS = 4096
+"""Rows that are computed at once: few enough for the processor's cache, and for memory."""
+
+
+class Recorder:
+    """Keeps the record of one simulation, and of each step what else the metrics need.
+
+    Args:
+        planned: The plan that is simulated.
+
+    Attributes:
+        error: Why the simulation broke down; None while it has not. Later steps are not kept.
+    """
+
+    def __init__(self, planned: Plan) -> None:
+        steps = planned.scenario.steps
+        self.error: DivergedError | None = None
+        self._planned = planned
+        self._done = 0
+        self._before = planned.start
+        self._columns: Record = {}
+        self._constraint: Array = np.empty((steps, planned.model.nv))
+        self._saturated: Bools = np.empty((steps, 2), dtype=bool)
+        self._unsolved: Bools = np.empty(steps, dtype=bool)
+        self._warnings = 0
+
+    def add(self, states: States) -> None:
+        """Take the next states of this one simulation."""
+        for start in range(0, states.time.shape[1], ROWS):
+            if self.error is None:
+                self._add(states.part(slice(start, start + ROWS)))
+
+        # The warnings are counted at the end of all these states.
+        self._warnings = int(states.warnings[0])
+        if self.error is None and self._warnings:
+            self.error = DivergedError(
+                f"MuJoCo gave {self._warnings} warnings in the last step",
+                self._done * self._planned.motion.timestep,
+            )
+
+    def _add(self, states: States) -> None:
+        """Take a few states."""
+        planned = self._planned
+        self.error = fault(states, planned.motion.timestep, self._done)
+        part = record.Part(states, self._done, self._before)
+        rows = slice(self._done, self._done + states.time.shape[1])
+        # The states of a breakdown may overflow; such an angle counts as off the path.
+        with np.errstate(all="ignore") if self.error is not None else nullcontext():
+            for name, values in record.columns(planned, part).items():
+                self._column(name)[rows] = values
+            self._saturated[rows] = record.saturated(planned, part)
+
+        self._constraint[rows] = states.constraint[0]
+        self._unsolved[rows] = states.iterations[0] >= planned.model.opt.iterations
+        self._before = states.qpos[0, -1].copy()
+        self._done = rows.stop
+
+    def _column(self, name: str) -> Array:
+        """Return a column to be filled; each lies in one piece of memory of its own."""
+        if name not in self._columns:
+            self._columns[name] = np.empty(self._planned.scenario.steps)
+        return self._columns[name]
+
+    @property
+    def record(self) -> Record:
+        """The columns of rollout.parquet, of the steps so far."""
+        return {name: column[: self._done] for name, column in self._columns.items()}
+
+    @property
+    def unrecorded(self) -> Unrecorded:
+        """The per-step data that the metrics need and the record leaves out."""
+        planned = self._planned
+        return Unrecorded(
+            steps=energy.Steps(planned.start, self._constraint, planned.pushes),
+            saturated=self._saturated,
+            unsolved=self._unsolved,
+            warnings=self._warnings,
+            ranges=record.ranges(planned.model),
+            trunk=record.lowest(planned.model),
+            growth=record.growth(planned, self.record),
+        )
+
+    def broken(self, error: DivergedError) -> DivergedError:
+        """Return the error of a run that broke down: when the foot left its path, and the cause."""
+        scenario = self._planned.scenario
+        left = 0.0
+        if self._done:
+            # Distances of a breakdown may overflow too.
+            with np.errstate(all="ignore"):
+                left = left_path(scenario.leg, self.record, error.time)
+        why = f"{scenario.name}: the foot left its path at t = {left:g} s; {error}"
+        return DivergedError(why, left)
