@@ -16,6 +16,7 @@ from fivebar_sim.arrays import Array
 from fivebar_sim.errors import DivergedError, FiveBarError, PoseError
 from fivebar_sim.model import without_log
 from fivebar_sim.simulation.asked import Asked, Latest, asked
+from fivebar_sim.simulation.lean import without_clock
 from fivebar_sim.simulation.plan import Plan, period_steps
 from fivebar_sim.simulation.steps import Legs, States, Watch, moving
 from fivebar_sim.simulation.taken import Periods, Singles, Taken
@@ -136,7 +137,7 @@ class _Loop:
         until = time.monotonic() + self._patience
         try:
             # What is not finite is found afterwards.
-            with without_log(), np.errstate(all="ignore"):
+            with without_log(), without_clock(), np.errstate(all="ignore"):
                 while self._k < end and time.monotonic() < until:
                     taken.take(self._commands(latest))
                     latest = taken.latest()

@@ -15,6 +15,7 @@ from fivebar_sim.errors import ArgumentError, DivergedError
 from fivebar_sim.kinematics.stops import SPEED_LIMIT
 from fivebar_sim.model import without_log
 from fivebar_sim.simulation.clipping import Clipping
+from fivebar_sim.simulation.lean import RECORDED, lean, without_clock
 from fivebar_sim.simulation.limited import STATE, rollout
 
 STEP = ("qfrc_constraint", "solver_niter")
@@ -90,7 +91,7 @@ class Legs:
         nthread: int = 1,
     ) -> None:
         shared = isinstance(models, mujoco.MjModel)
-        stepped = [models] if shared else list(models)
+        stepped = lean([models] if shared else models)
         first = stepped[0]
         if qpos.ndim != 2 or qpos.shape[1] != first.nq:
             raise ArgumentError(f"qpos must have shape (nsim, {first.nq}), got {qpos.shape}")
@@ -102,7 +103,7 @@ class Legs:
         self._clipping = Clipping.of(stepped * len(qpos) if shared else stepped)
         self._sizes = first.nq, first.nv, first.nu
 
-        ground = mujoco.mj_name2id(first, mujoco.mjtObj.mjOBJ_SENSOR, "ground")
+        ground = mujoco.mj_name2id(first, mujoco.mjtObj.mjOBJ_SENSOR, RECORDED)
         self._ground = None if ground < 0 else int(first.sensor_adr[ground]) + 1  # after "found"
 
     def advance(self, ctrl: Array) -> States:
@@ -122,7 +123,7 @@ class Legs:
             raise ArgumentError("ctrl must be finite: MuJoCo would reset the leg and go on")
 
         record = (STATE, *STEP) if self._ground is None else (STATE, *STEP, "sensordata")
-        with without_log():
+        with without_log(), without_clock():
             if self._clipping is None:
                 out = self._batch.rollout(ctrl.shape[1], ctrl, record=record)
             else:
