@@ -12,16 +12,16 @@ from hypothesis import strategies as st
 from fivebar_sim.metrics import Limit
 from fivebar_sim.regression.baseline import Recorded
 from fivebar_sim.regression.ci_files import NO_XML, junit, markdown
-from fivebar_sim.regression.comparison import BETTER, FAIL, NEW, PASS, Checked, Row
+from fivebar_sim.regression.comparison import BETTER, FAIL, NEW, PASS, Checked, Compared
 
 RECORDED = Recorded(1e-3, 1e-9, 0.005)
 LIMIT = Limit("tracking.rms", 0.0, 1.3e-3, 1.1e-3, True)
 ROWS = [
-    Row("tracking.rms", LIMIT, RECORDED, 1.1e-3, FAIL, "tracking RMS: worse"),
-    Row("tracking.max", None, RECORDED, 1e-3, PASS, ""),
-    Row("closure.max", None, RECORDED, 0.5e-3, BETTER, "loop gap max: less"),
-    Row("closure.rms", None, RECORDED, 0.5e-3, NEW, "loop gap RMS: moved"),
-    Row("load.share_A", Limit("load.share_A", 0.4, 0.6, None, False), None, None, FAIL, "why"),
+    Compared("tracking.rms", LIMIT, RECORDED, 1.1e-3, FAIL, "tracking RMS: worse"),
+    Compared("tracking.max", None, RECORDED, 1e-3, PASS, ""),
+    Compared("closure.max", None, RECORDED, 0.5e-3, BETTER, "loop gap max: less"),
+    Compared("closure.rms", None, RECORDED, 0.5e-3, NEW, "loop gap RMS: moved"),
+    Compared("load.share_A", Limit("load.share_A", 0.4, 0.6, None, False), None, None, FAIL, "why"),
 ]
 CHECKED = [
     Checked("one", ROWS, "", ["mind"]),

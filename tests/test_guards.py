@@ -353,16 +353,16 @@ def test_everyone_is_told(shell: Shell) -> None:
     assert metrics["verdict"] == "fail"
 
 
-def test_new_guard_is_a_row_and_a_function(shell: Shell, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Verdict, console, report and JUnit have a guard that only its row names."""
+def test_new_guard_is_a_rule_and_a_function(shell: Shell, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Verdict, console, report and JUnit have a guard that only its rule names."""
 
     def too_deep(run: guards.Evidence) -> guards.Found:
         depth = float(-run.record["foot_z"].min())
         return guards.Found(depth, 0.01, float(run.record["time"][3]))
 
-    row = guards.Row("depth", too_deep, "foot below {}", ", {} at worst", 1e3, "mm")
-    monkeypatch.setattr(guards, "GUARDS", (*guards.GUARDS, row))
-    monkeypatch.setitem(guards.ROWS, row.name, row)
+    rule = guards.Rule("depth", too_deep, "foot below {}", ", {} at worst", 1e3, "mm")
+    monkeypatch.setattr(guards, "GUARDS", (*guards.GUARDS, rule))
+    monkeypatch.setitem(guards.RULES, rule.name, rule)
 
     words = "guard depth: foot below 10 mm at t = 0.004 s, "
     said = shell("run", "short.toml", "--out", "run")

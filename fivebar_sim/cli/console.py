@@ -19,7 +19,7 @@ from fivebar_sim.runs.side_by_side import side_by_side
 from fivebar_sim.scenario.leg_words import leg_words
 
 if TYPE_CHECKING:
-    from fivebar_sim.regression.comparison import Checked, Row
+    from fivebar_sim.regression.comparison import Checked, Compared
     from fivebar_sim.regression.convergence import Study
     from fivebar_sim.rollout import Result
     from fivebar_sim.scenario import Scenario
@@ -130,7 +130,7 @@ def _tripped(study: Study) -> list[str]:
     return [f"{study.integrator} at {1e3 * h:g} ms: {line}" for h, said in runs for line in said]
 
 
-def _word(row: Row) -> str:
+def _word(row: Compared) -> str:
     """Return a metric's verdict with rich's colour tags."""
     plain = row.verdict in ("pass", "FAIL")
     return verdict(row.verdict == "pass") if plain else f"[cyan]{row.verdict}[/cyan]"

@@ -111,21 +111,21 @@ class Guard(Table, frozen=True):
     part: Annotated[str, msgspec.Meta(pattern="^[A-Za-z0-9 ]+$")] | None = None
 
     def __post_init__(self) -> None:
-        if self.name not in ROWS:
-            raise ValueError(unknown("guard", self.name, ROWS))
+        if self.name not in RULES:
+            raise ValueError(unknown("guard", self.name, RULES))
         if self.ok != (self.time is None):
             raise ValueError(f"ok must be {str(not self.ok).lower()} with time {self.time}")
 
     @property
     def bound(self) -> str:
         """What must not happen, in words, of the part that tripped it or of any part of the leg."""
-        row = ROWS[self.name]
-        return row.what.format(row.show(self.high, 3), part=self.part or "leg")
+        rule = RULES[self.name]
+        return rule.what.format(rule.show(self.high, 3), part=self.part or "leg")
 
     def __str__(self) -> str:
         """Return the message of a guard that tripped: the bound, when, and the worst value."""
-        row = ROWS[self.name]
-        worst = row.worst.format(row.show(self.value, 3))
+        rule = RULES[self.name]
+        worst = rule.worst.format(rule.show(self.value, 3))
         return f"guard {self.name}: {self.bound} at t = {self.time:g} s{worst}"
 
 
@@ -176,8 +176,8 @@ class Found(NamedTuple):
     part: str | None = None
 
 
-class Row(NamedTuple):
-    """A guard of the catalogue.
+class Rule(NamedTuple):
+    """What a guard looks at, and what it says.
 
     Attributes:
         name: Name of the guard, and of its bound in a scenario, if it has one.
@@ -203,7 +203,7 @@ class Row(NamedTuple):
 
 def judge(run: Evidence) -> list[Guard]:
     """Return every guard of a run."""
-    found = [(row.name, row.function(run)) for row in GUARDS]
+    found = [(rule.name, rule.function(run)) for rule in GUARDS]
     return [
         Guard(name=name, **each._asdict(), ok=each.time is None)
         for name, each in found
@@ -344,8 +344,8 @@ def _part(run: Evidence, energy: Array, high: float, more: float = 0.0) -> Found
 
 
 GUARDS = (
-    Row("branch", _left_branch, "the leg left its branch", "", 1.0, "flips"),
-    Row(
+    Rule("branch", _left_branch, "the leg left its branch", "", 1.0, "flips"),
+    Rule(
         "loop",
         _open_loop,
         "the loop was open by more than {}",
@@ -353,7 +353,7 @@ GUARDS = (
         1e3,
         "mm",
     ),
-    Row(
+    Rule(
         "torque",
         _clipped_torque,
         "a motor's torque had been clipped for more than {} of a second",
@@ -361,7 +361,7 @@ GUARDS = (
         1e2,
         "%",
     ),
-    Row(
+    Rule(
         "chatter",
         _chatter,
         "a motor's torque had turned round with every command in more than {} of a second",
@@ -369,7 +369,7 @@ GUARDS = (
         1e2,
         "%",
     ),
-    Row(
+    Rule(
         "energy",
         _unaccounted_energy,
         "more than {} of the energy turned over was unaccounted for",
@@ -377,7 +377,7 @@ GUARDS = (
         1e2,
         "%",
     ),
-    Row(
+    Rule(
         "constraints",
         _giving_constraints,
         "loop, gears or ends of travel had given more than {} of the energy at stake",
@@ -385,7 +385,7 @@ GUARDS = (
         1e2,
         "%",
     ),
-    Row(
+    Rule(
         "step",
         _giving_steps,
         "the steps by themselves had given or taken more than {} of the energy turned over",
@@ -393,7 +393,7 @@ GUARDS = (
         1e2,
         "%",
     ),
-    Row(
+    Rule(
         "solver",
         _unsolved,
         "MuJoCo's solver did not converge",
@@ -401,7 +401,7 @@ GUARDS = (
         1.0,
         "steps",
     ),
-    Row(
+    Rule(
         "stops",
         _leaned,
         "{part} leaned into its stop by more than {}",
@@ -409,7 +409,7 @@ GUARDS = (
         DEGREES,
         "deg",
     ),
-    Row(
+    Rule(
         "contact",
         _creeping,
         "a foot that should stick crept under implicitfast, and changed a torque by more than {}",
@@ -417,7 +417,7 @@ GUARDS = (
         1e2,
         "%",
     ),
-    Row(
+    Rule(
         "heat",
         _overheated,
         "for good, this would give a winding more than {} of the heat that it bears",
@@ -425,7 +425,7 @@ GUARDS = (
         1e2,
         "%",
     ),
-    Row(
+    Rule(
         "feedback",
         _unstable,
         "held for its period the feedback is unstable, which the timestep hides: errors had grown "
@@ -434,7 +434,7 @@ GUARDS = (
         1.0,
         "",
     ),
-    Row(
+    Rule(
         "ground",
         _in_floor,
         "the foot was in the floor by more than {}",
@@ -442,7 +442,7 @@ GUARDS = (
         1e3,
         "mm",
     ),
-    Row(
+    Rule(
         "floor",
         _through_floor,
         "the {part} was in the floor by more than {}",
@@ -450,7 +450,7 @@ GUARDS = (
         1e3,
         "mm",
     ),
-    Row(
+    Rule(
         "rail",
         _carrying_rail,
         "the rail's end carried the trunk, with more than {}",
@@ -459,7 +459,7 @@ GUARDS = (
         "N",
     ),
 )
-"""Every guard, in the order of metrics.json; a new guard is a row and a function."""
+"""Every guard, in the order of metrics.json; a new guard is a rule and a function."""
 
-ROWS = {row.name: row for row in GUARDS}
+RULES = {rule.name: rule for rule in GUARDS}
 """The guards by name."""

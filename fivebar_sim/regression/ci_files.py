@@ -10,7 +10,7 @@ from xml.etree import ElementTree
 from fivebar_sim.metrics.catalogue import SHOWN, shown
 from fivebar_sim.metrics.limits import bounds
 from fivebar_sim.metrics.measured import NOT_JUDGED
-from fivebar_sim.regression.comparison import BETTER, FAIL, Checked, Row
+from fivebar_sim.regression.comparison import BETTER, FAIL, Checked, Compared
 
 UNJUDGED = f"{NOT_JUDGED} (guards hold)"
 """Verdict of a run without limits and baseline."""
@@ -105,7 +105,7 @@ def _table(checked: Sequence[Checked]) -> Iterator[str]:
             yield f"| {' | '.join([_md(each.name), *_cells(row)])} |"
 
 
-def _cells(row: Row) -> list[str]:
+def _cells(row: Compared) -> list[str]:
     """Return the cells of one metric's row."""
     limit = bounds(row.limit) if row.limit else ""
     then = shown(row.key, row.recorded.value) if row.recorded else ""

@@ -19,7 +19,7 @@ BETTER = "better"
 NEW = "new"
 
 
-class Row(NamedTuple):
+class Compared(NamedTuple):
     """One metric.
 
     Attributes:
@@ -58,7 +58,7 @@ class Checked(NamedTuple):
     """
 
     name: str
-    rows: list[Row]
+    rows: list[Compared]
     broke: str
     notes: list[str]
 
@@ -133,7 +133,7 @@ def _notes(baseline: Baseline | None, metrics: Mapping[str, Any]) -> Iterator[st
 
 def _row(
     key: str, limit: Limit | None, recorded: Recorded | None, metrics: Mapping[str, Any]
-) -> Row:
+) -> Compared:
     """Return one metric; a broken limit outranks any difference to the baseline."""
     # A baseline may still name metrics of a ground that the scene no longer has.
     now = look_up(metrics, key) if has(metrics, key) else None
@@ -145,7 +145,7 @@ def _row(
     if limit is not None and not limit.ok:
         verdict = FAIL
         why = f"{shown(key, now)}, limit {bounds(limit)}"
-    return Row(key, limit, recorded, now, verdict, why and f"{label}: {why}")
+    return Compared(key, limit, recorded, now, verdict, why and f"{label}: {why}")
 
 
 def _against(key: str, recorded: Recorded, now: float | None) -> tuple[str, str]:

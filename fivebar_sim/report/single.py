@@ -11,6 +11,7 @@ import tomli_w
 from fivebar_sim.checks import is_finite
 from fivebar_sim.metrics import guards, tracking
 from fivebar_sim.metrics.catalogue import BY_KEY, SHOWN, shown
+from fivebar_sim.metrics.columns import MOTORS
 from fivebar_sim.metrics.limits import bounds, look_up
 from fivebar_sim.report import html, in_plane, motors, numbers, over_time
 from fivebar_sim.report.draw import Drawn
@@ -103,10 +104,10 @@ def _guards(run: StoredRun) -> str:
     rows: list[tuple[str, str, html.Cell]] = []
 
     for guard in guarded:
-        row = guards.ROWS[guard.name]
+        rule = guards.RULES[guard.name]
         # An undefined value is none, where the row would show a 0.
-        worst = "undefined" if guard.value is None else row.show(guard.value)
-        rows.append((f"{row.name}: {guard.bound}", worst, html.verdict(guard.ok)))
+        worst = "undefined" if guard.value is None else rule.show(guard.value)
+        rows.append((f"{rule.name}: {guard.bound}", worst, html.verdict(guard.ok)))
 
     said = f"Guards: all {len(guarded)} hold"
     if lost:
@@ -133,7 +134,7 @@ def _load(run: StoredRun) -> str:
     }
     rows: list[tuple[str, str, str]] = []
     for key, label in named.items():
-        pair = [key.format(m) if "{}" in key else f"{key}.{m}" for m in "AE"]
+        pair = [key.format(m) if "{}" in key else f"{key}.{m}" for m in MOTORS]
         A, E = (
             f"{shown(each, look_up(run.metrics, each))}{when(run.metrics, BY_KEY[each])}"
             for each in pair
@@ -147,7 +148,7 @@ def _load(run: StoredRun) -> str:
     limit = run.scenario.servo.limit
     if limit is not None:
         # The servo has to give the peak of the whole run, wherever the window begins.
-        peaks = [look_up(run.metrics, f"whole.torque_peak.{motor}") or 0.0 for motor in "AE"]
+        peaks = [look_up(run.metrics, f"whole.torque_peak.{motor}") or 0.0 for motor in MOTORS]
         A, E = (shown("load.share_A", peak / limit) for peak in peaks)
         rows.append((f"peak (run), of the servo's {shown('load.torque_peak.A', limit)}", A, E))
 
