@@ -36,7 +36,7 @@ LEVELS = (
 
 MOST_AT_THE_TOP = 15
 MOST_IN_A_ROOM = 14
-"""Modules. The largest rooms have one module for each command, or one for each part of a run that is judged."""
+"""Modules. In the largest rooms, `cli` and `metrics`, each is a command or a part of a verdict."""
 
 
 MOST_IN_A_FUNCTION = 30

@@ -26,7 +26,7 @@ MOTORS = ("A", "E")
 MOTOR_JOINTS = [JOINTS.index(motor) for motor in MOTORS]
 """Where the motors stand among the joints."""
 
-MOTORS_FROM_END = [place - len(JOINTS) for place in MOTOR_JOINTS]
+MOTORS_FROM_END = slice(MOTOR_JOINTS[0] - len(JOINTS), None, MOTOR_JOINTS[1] - MOTOR_JOINTS[0])
 """Where the motors stand in qpos and qvel, whatever comes before the joints."""
 
 JOINT_COLUMNS = tuple(f"theta_{joint}" for joint in JOINTS)

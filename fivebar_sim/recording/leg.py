@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike
 from fivebar_sim.arrays import Array
 from fivebar_sim.geometry import FiveBar
 from fivebar_sim.kinematics import bases, chain_points
+from fivebar_sim.metrics.columns import MOTORS
 from fivebar_sim.recording.look import GREY, PIN, Colour, Look, shade
 from fivebar_sim.recording.poses import DrawnMotion, in_height
 
@@ -105,7 +106,7 @@ def _log_base(stream: rr.RecordingStream, leg: FiveBar, look: Look) -> None:
     import rerun as rr
 
     r = leg.radius
-    for joint, base, side in zip("AE", bases(leg), (-1.0, 1.0), strict=True):
+    for joint, base, side in zip(MOTORS, bases(leg), (-1.0, 1.0), strict=True):
         centre = (base[0], 3.5 * side * r, base[1])
         motor = _axle(centre, 3.0 * r, 2.0 * r, None, shade(joint), look)
         stream.log(f"{look.root}{HIP}/{joint}", motor, static=True)

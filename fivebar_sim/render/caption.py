@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from fivebar_sim import kinematics
+from fivebar_sim.metrics.columns import MOTORS
 from fivebar_sim.render.frames import Frame
 from fivebar_sim.render.palette import COLOURS, PAPER
 from fivebar_sim.render.replay import Replay
@@ -102,7 +103,7 @@ class Caption:
         bases = kinematics.bases(self._replay.scenario.leg)
         half = 0.7 * self._letters
         gap = half + self._pixels_per_metre() * 1.5 * self._replay.scenario.leg.radius
-        for letter, base, side in zip("AE", bases, (-1.0, 1.0), strict=True):
+        for letter, base, side in zip(MOTORS, bases, (-1.0, 1.0), strict=True):
             x, y = self._camera.pixel(base + hip, *self._seen)
             x += side * gap
             box = (x - half, y - half, x + half, y + half)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from fivebar_sim import kinematics, workspace
 from fivebar_sim.arrays import Array
 from fivebar_sim.metrics.catalogue import shown
-from fivebar_sim.metrics.columns import JOINT_COLUMNS
+from fivebar_sim.metrics.columns import JOINT_COLUMNS, MOTORS
 from fivebar_sim.metrics.limits import look_up
 from fivebar_sim.recording.plots import points
 from fivebar_sim.report import draw
@@ -137,7 +137,7 @@ def _letter(ax: Axes, joints: dict[str, Array]) -> None:
     for letter, point in joints.items():
         away = point - middle
         # Coaxial motors are at one place: one letter stands to the left and one to the right.
-        if letter in "AE" and np.array_equal(joints["A"], joints["E"]):
+        if letter in MOTORS and np.array_equal(joints["A"], joints["E"]):
             away = np.array([-1.0 if letter == "A" else 1.0, 1.0])
         offset = BESIDE * away / max(float(np.hypot(*away)), 1e-12)
         ax.annotate(

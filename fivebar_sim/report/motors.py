@@ -8,6 +8,7 @@ import numpy as np
 
 from fivebar_sim.arrays import Array
 from fivebar_sim.metrics.catalogue import shown
+from fivebar_sim.metrics.columns import MOTORS
 from fivebar_sim.metrics.limits import look_up
 from fivebar_sim.report import axes, draw, numbers
 from fivebar_sim.report.draw import Drawn
@@ -24,7 +25,7 @@ def angles(run: StoredRun) -> Drawn:
     sent = numbers.drive(run) == "position"
     cut = False
 
-    for ax, motor in zip(both, "AE", strict=True):
+    for ax, motor in zip(both, MOTORS, strict=True):
         lines = {"angle": np.degrees(run.record[f"theta_{motor}"])}
         draw.line(ax, run.record["time"], lines["angle"], motor, lw=2.4, label=f"angle {motor}")
         if sent:
@@ -47,11 +48,11 @@ def angles(run: StoredRun) -> Drawn:
 def speeds(run: StoredRun) -> Drawn:
     """Draw the speeds of both motors."""
     figure, (ax,) = draw.panels(1, height=2.9)
-    lines = {motor: run.record[f"theta_dot_{motor}"] for motor in "AE"}
+    lines = {motor: run.record[f"theta_dot_{motor}"] for motor in MOTORS}
     cut = _both(ax, run, "speed [rad/s]", lines)
     figure.legend(loc="outside upper center", ncols=2)
     window = run.scenario.window
-    most = " and ".join(f"{np.abs(lines[motor][window]).max():.3g} rad/s" for motor in "AE")
+    most = " and ".join(f"{np.abs(lines[motor][window]).max():.3g} rad/s" for motor in MOTORS)
     no_load = run.scenario.servo.speed
     line = "" if no_load is None else f" The servo turns at {no_load:.3g} rad/s without load."
     return Drawn(
@@ -66,13 +67,13 @@ def speeds(run: StoredRun) -> Drawn:
 def power(run: StoredRun) -> Drawn:
     """Draw the mechanical power of both motors."""
     figure, (ax,) = draw.panels(1, height=2.9)
-    given = {motor: numbers.power(run, motor) for motor in "AE"}
+    given = {motor: numbers.power(run, motor) for motor in MOTORS}
     scale, unit = (1.0, "W") if np.abs(list(given.values())).max() >= 1.0 else (1e3, "mW")
     cut = _both(ax, run, f"power [{unit}]", {m: scale * watts for m, watts in given.items()})
     ax.axhline(0.0, color=colour("muted"), lw=0.8)
     figure.legend(loc="outside upper center", ncols=2)
     work = " and ".join(
-        shown("load.work.A.net", look_up(run.metrics, f"load.work.{motor}.net")) for motor in "AE"
+        shown("load.work.A.net", look_up(run.metrics, f"load.work.{motor}.net")) for motor in MOTORS
     )
     return Drawn(
         "power",
@@ -93,7 +94,7 @@ def torque_speed(run: StoredRun) -> Drawn:
     window = run.scenario.window
     fastest = 0.0
     largest = 0.0
-    for motor in "AE":
+    for motor in MOTORS:
         speed = run.record[f"theta_dot_{motor}"][window]
         torque = 1e3 * run.record[f"torque_{motor}"][window]
         rows = np.union1d(draw.envelope(speed), draw.envelope(torque))

@@ -10,6 +10,7 @@ from fivebar_sim import units
 from fivebar_sim.arrays import Array
 from fivebar_sim.metrics import ground, tracking
 from fivebar_sim.metrics.catalogue import shown
+from fivebar_sim.metrics.columns import MOTORS
 from fivebar_sim.metrics.limits import look_up
 from fivebar_sim.recording.plots import SHARE_WINDOW
 from fivebar_sim.recording.poses import points
@@ -84,9 +85,9 @@ def torque(run: StoredRun) -> Drawn:
     figure, both = draw.panels(1, 1, height=4.6)
     window = run.scenario.window
     # One scale for both motors, or an idle one would look as busy as the other.
-    largest = max(float(np.abs(run.record[f"torque_{motor}"][window]).max()) for motor in "AE")
+    largest = max(float(np.abs(run.record[f"torque_{motor}"][window]).max()) for motor in MOTORS)
     cut = False
-    for ax, motor in zip(both, "AE", strict=True):
+    for ax, motor in zip(both, MOTORS, strict=True):
         cut |= _torque(ax, run, motor, largest)
 
     share = look_up(run.metrics, "load.share_A")
@@ -101,7 +102,7 @@ def torque(run: StoredRun) -> Drawn:
     rms, peak = (
         " and ".join(
             shown(f"load.torque_{kind}.{m}", look_up(run.metrics, f"load.torque_{kind}.{m}"))
-            for m in "AE"
+            for m in MOTORS
         )
         for kind in ("rms", "peak")
     )

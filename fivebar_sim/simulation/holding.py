@@ -7,6 +7,7 @@ import numpy as np
 from fivebar_sim import dynamics, units
 from fivebar_sim.arrays import Array
 from fivebar_sim.errors import ConfigError
+from fivebar_sim.metrics.columns import MOTORS
 from fivebar_sim.motion import Motion
 from fivebar_sim.scenario import Scenario
 from fivebar_sim.scenario.scenes import Ground
@@ -31,7 +32,7 @@ def check(scenario: Scenario, wanted: Motion) -> None:
     worst = np.abs(torque).max(axis=1) - scenario.servo.friction
     k = int(np.argmax(worst))
     if worst[k] > limit:
-        name = "AE"[int(np.argmax(np.abs(torque[k])))]
+        name = MOTORS[int(np.argmax(np.abs(torque[k])))]
         raise ConfigError(
             f"servo.limit cannot hold the leg at t = {wanted.time[k]:g} s: motor {name} must give "
             f"at least {units.text(worst[k], 'N m')} there at rest, got a limit of "

@@ -10,10 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fivebar_sim.arrays import Array, Bools
+from fivebar_sim.metrics.columns import MOTORS_FROM_END
 from fivebar_sim.simulation.clipping import MODES, SLACK, Clipping, Integers, clipped, number
-
-MOTORS = slice(-4, None, 2)
-"""Where qpos and qvel have A and E."""
 
 INPUTS = mujoco.mjtState.mjSTATE_CTRL | mujoco.mjtState.mjSTATE_QFRC_APPLIED
 """What every step is given: commands, then forces on the joints."""
@@ -235,12 +233,12 @@ class _Part:
         """Return motor angles and rates in some states, (..., 2) each."""
         qpos = state[..., 1 : 1 + self._nq]
         qvel = state[..., 1 + self._nq :]
-        return qpos[..., MOTORS], qvel[..., MOTORS]
+        return qpos[..., MOTORS_FROM_END], qvel[..., MOTORS_FROM_END]
 
     def _step(self, who: Integers, ctrl: Array, lacks: Array) -> dict[Any, Array]:
         """Return what is recorded of steps with torques on top at A and E, (m, N, 2)."""
         forces = np.zeros((*ctrl.shape[:2], self._start[WARMSTART].shape[-1]))
-        forces[..., MOTORS] = lacks
+        forces[..., MOTORS_FROM_END] = lacks
         given = np.concatenate([ctrl, forces], axis=-1)
         ids = self._ids[who]
         return self._stepper.rollout(ctrl.shape[1], given, int(INPUTS), self._record, ids)

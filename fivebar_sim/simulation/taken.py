@@ -7,7 +7,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from fivebar_sim.arrays import Array
-from fivebar_sim.simulation.limited import MOTORS
+from fivebar_sim.metrics.columns import MOTORS_FROM_END
 from fivebar_sim.simulation.steps import Legs, States
 
 
@@ -40,8 +40,8 @@ class Singles:
         self._count = 0
         live = legs.live()
         now = legs.states([each[:, None] for each in live], live[0][:, None, -2:], legs.warned())
-        self._angles = now.qpos[..., MOTORS]
-        self._rates = now.qvel[..., MOTORS]
+        self._angles = now.qpos[..., MOTORS_FROM_END]
+        self._rates = now.qvel[..., MOTORS_FROM_END]
         # Whole arrays, however little of them is needed: a call costs more than its bytes.
         self._pairs: list[Any] = [
             (np.empty((length, *now.shape), now.dtype), now) for now in (*live, legs.warned())
@@ -85,7 +85,7 @@ class Periods:
     def latest(self) -> tuple[Array, Array]:
         """Return the motors' angles and rates after the last steps, (nsim, n, 2)."""
         last = self._parts[-1]
-        return last.qpos[..., MOTORS], last.qvel[..., MOTORS]
+        return last.qpos[..., MOTORS_FROM_END], last.qvel[..., MOTORS_FROM_END]
 
     def states(self) -> States:
         """Return the states after all steps, until MuJoCo first warned."""

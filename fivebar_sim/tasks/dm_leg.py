@@ -14,6 +14,7 @@ from dm_control.rl import control
 from dm_env import specs
 
 from fivebar_sim.arrays import Array
+from fivebar_sim.metrics.columns import MOTORS
 from fivebar_sim.model import without_log
 from fivebar_sim.simulation.clipping import Clipping
 from fivebar_sim.simulation.limited import STATE, rollout
@@ -146,7 +147,9 @@ class LegTask(control.Task):
         low = self.episodes.low
         high = self.episodes.high
         # Separated by tabs, as in the specs of dm_control's own physics.
-        name = "\t".join(f"{name}_{motor}" for name in self.episodes.task.actions for motor in "AE")
+        name = "\t".join(
+            f"{name}_{motor}" for name in self.episodes.task.actions for motor in MOTORS
+        )
         return specs.BoundedArray(low.shape, np.float64, low, high, name)
 
     def observation_spec(self, physics: LegPhysics) -> OrderedDict[str, specs.Array]:

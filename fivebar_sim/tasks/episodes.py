@@ -18,7 +18,7 @@ from fivebar_sim.control.step import ControlStep
 from fivebar_sim.errors import ArgumentError
 from fivebar_sim.kinematics.leg_arrays import LegArrays
 from fivebar_sim.kinematics.stops import SPEED_LIMIT
-from fivebar_sim.metrics.columns import MOTORS_FROM_END as MOTORS
+from fivebar_sim.metrics.columns import MOTORS_FROM_END
 from fivebar_sim.tasks.base import Part, Task
 from fivebar_sim.tasks.motion import TIME, motion
 
@@ -82,7 +82,7 @@ class Episodes:
             timestep=task.timestep,
             every=task.every,
             steps=task.periods * task.every,
-            start=self.qpos[:, MOTORS],
+            start=self.qpos[:, MOTORS_FROM_END].copy(),
             seeds=range(self.size),
         )
 
@@ -103,7 +103,7 @@ class Episodes:
         self._fresh[rows] = True
         self._broken[rows] = False
         self._torque[rows] = 0.0
-        self._control.restart(rows, qpos[:, MOTORS], seeds)
+        self._control.restart(rows, qpos[:, MOTORS_FROM_END], seeds)
         return qpos
 
     def check_action(self, action: object, shape: tuple[int, ...]) -> Array:
@@ -159,24 +159,24 @@ class Episodes:
         # A comparison with NaN is False, so NaN is unsound too.
         sound = np.abs(qvel).max(axis=(1, 2)) < SPEED_LIMIT
         self._broken = ~(sound & np.isfinite(qpos).all(axis=(1, 2)) & (warnings == 0))
-        q = qpos[..., MOTORS]
-        v = qvel[..., MOTORS]
+        q = qpos[..., MOTORS_FROM_END]
+        v = qvel[..., MOTORS_FROM_END]
 
         # Agents must never see NaN: the observation after a breakdown is that of the period before.
         if self._broken.any():
             bad = self._broken[:, None, None]
             qpos = np.where(bad, self.qpos[:, None], qpos)
             qvel = np.where(bad, self.qvel[:, None], qvel)
-            q = qpos[..., MOTORS]
-            v = qvel[..., MOTORS]
+            q = qpos[..., MOTORS_FROM_END]
+            v = qvel[..., MOTORS_FROM_END]
 
-        before = np.concatenate([self.qpos[:, None, MOTORS], q[:, :-1]], axis=1)
+        before = np.concatenate([self.qpos[:, None, MOTORS_FROM_END], q[:, :-1]], axis=1)
         task = self.task
         self._torque = applied_torque(
             self._servo, task.integrator, self._ctrl, before, q, v, task.drive
         )
-        self._control.moved(q, v)
         # Copies: a view of the last step would keep all steps of the period in memory.
+        self._control.moved(q.copy(), v.copy())
         self.qpos = qpos[:, -1].copy()
         self.qvel = qvel[:, -1].copy()
         self._count += 1
