@@ -115,12 +115,10 @@ def wrong_knee(right: Right, *args: Any) -> Any:
     return q * np.array([1.0, -1.0, 1.0, 1.0])
 
 
-def raw_torque(
-    right: Right, servo: Any, integrator: Any, ctrl: Any, q: Any, v: Any, *_: Any
-) -> Any:
+def raw_torque(right: Right, servo: Any, step: Any) -> Any:
     """Return what MuJoCo's actuator sensor shows: the spring at the start of the step."""
-    del right, integrator, v
-    return servo.kp * (ctrl - q)
+    del right
+    return servo.kp * (step.ctrl - step.q)
 
 
 def columns(change: Callable[[dict[str, Any]], dict[str, Any]]) -> Put:

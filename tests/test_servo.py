@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from fivebar_sim import model, motion
 from fivebar_sim.arrays import Array
 from fivebar_sim.control.bus import Bus
-from fivebar_sim.control.servo import Drive, Servo, applied_torque, saturated
+from fivebar_sim.control.servo import Drive, MotorStep, Servo, applied_torque, saturated
 from fivebar_sim.errors import ArgumentError, ConfigError
 from fivebar_sim.files import resources
 from fivebar_sim.geometry import FiveBar
@@ -93,10 +93,11 @@ def test_torque_balances_momentum(name: str, integrator: Integrator, drive: Driv
     q, q_next, v_next, needed = steps(mj, start, ctrl)
     q, q_next, v_next = (rows[:, MOTORS] for rows in (q, q_next, v_next))
     torque = np.zeros_like(needed)
-    torque[:, MOTORS] = applied_torque(servo, integrator, ctrl, q, q_next, v_next, drive)
+    step = MotorStep(integrator, ctrl, q, q_next, v_next, drive)
+    torque[:, MOTORS] = applied_torque(servo, step)
     # rounding: M v / h and the constraint force, tens of times the torque, cancel in the balance
     np.testing.assert_allclose(needed, torque, rtol=0, atol=1e-9 * np.abs(torque).max())
-    clips = saturated(servo, integrator, ctrl, q, q_next, v_next, drive)
+    clips = saturated(servo, step)
     if name in CLIPS and drive == "position":
         assert 0.01 < clips.mean() < 1.0
     if drive == "torque" and servo.limit is not None and 1.5 * servo.limit < 0.02:
@@ -107,7 +108,7 @@ def test_torque_balances_momentum(name: str, integrator: Integrator, drive: Driv
 def test_damping_is_what_a_velocity_feedforward_cancels(drive: Drive) -> None:
     zero = np.zeros(2)
     rate = np.array([0.3, -0.2])
-    lost = applied_torque(LINE, "implicitfast", zero, zero, zero, rate, drive)
+    lost = applied_torque(LINE, MotorStep("implicitfast", zero, zero, zero, rate, drive))
     gain = LINE.damping if drive == "position" else LINE.back_emf
     np.testing.assert_allclose(lost, -gain * rate, rtol=1e-12)
     assert (PLAIN.damping, PLAIN.back_emf) == (PLAIN.kd, 0.0)
@@ -158,7 +159,7 @@ def test_stalled_motor_gives_its_limit(name: str, integrator: Integrator, drive:
     # the damping acts on the rate after the step, h limit / 1000 kg m^2
     np.testing.assert_allclose(gives, [servo.limit, -servo.limit], rtol=1e-6)
     state = data.ctrl, before, data.qpos, data.qvel
-    torque = applied_torque(servo, integrator, *state, drive)
+    torque = applied_torque(servo, MotorStep(integrator, *state, drive))
     np.testing.assert_allclose(torque, [servo.limit, -servo.limit], rtol=1e-6)
 
 

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from fivebar_sim import FiveBar, dynamics, kinematics, tasks, workspace
 from fivebar_sim.control import Observation
-from fivebar_sim.control.servo import Drive, Servo, ServoArrays, applied_torque
+from fivebar_sim.control.servo import Drive, MotorStep, Servo, ServoArrays, applied_torque
 from fivebar_sim.errors import ArgumentError, ConfigError, UnreachableError
 from fivebar_sim.kinematics.leg_arrays import LegArrays
 from fivebar_sim.paths import Circle, Gait, Line
@@ -175,10 +175,10 @@ def test_servo_arrays_apply_what_each_servo_does(speed: float | None, drive: Dri
     servos = [Servo(kp=kp, kd=kd, limit=0.3, speed=speed) for kp, kd in ((2.0, 0.1), (9.0, 0.02))]
     ctrl, q, q_next, v_next = np.random.default_rng(2).normal(size=(4, 2, 4, 2))
     both = ServoArrays.of(servos)
-    together = applied_torque(both, "discrete", ctrl, q, q_next, v_next, drive)
+    together = applied_torque(both, MotorStep("discrete", ctrl, q, q_next, v_next, drive))
     for row, servo in enumerate(servos):
         own = (ctrl[row], q[row], q_next[row], v_next[row])
-        alone = applied_torque(servo, "discrete", *own, drive)
+        alone = applied_torque(servo, MotorStep("discrete", *own, drive))
         np.testing.assert_array_equal(together[row], alone)
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import msgspec
 import numpy as np
@@ -266,34 +266,35 @@ def read_table(source: str | Path) -> tables.Table:
     return table
 
 
-def saturated(
-    servo: Servo | ServoArrays,
-    integrator: Integrator,
-    ctrl: Array,
-    q: Array,
-    q_next: Array,
-    v_next: Array,
-    drive: Drive = "position",
-) -> Bools:
-    """Return whether the limit clips the torque that a step ends with.
+class MotorStep(NamedTuple):
+    """A step as the motors see it; all arrays have one shape.
 
-    Args and shapes are those of `applied_torque`.
+    Attributes:
+        integrator: MuJoCo's integrator.
+        ctrl: Commands u of the step [rad or N m].
+        q: Motor angles before the step [rad].
+        q_next: Motor angles after it [rad].
+        v_next: Motor rates after it [rad/s].
+        drive: Whether commands are angles or torques.
     """
+
+    integrator: Integrator
+    ctrl: Array
+    q: Array
+    q_next: Array
+    v_next: Array
+    drive: Drive = "position"
+
+
+def saturated(servo: Servo | ServoArrays, step: MotorStep) -> Bools:
+    """Return whether the limit clips the torque that a step ends with, in the step's shape."""
     if servo.limit is None:
-        return np.zeros(np.shape(ctrl), dtype=bool)
-    return np.abs(_asked(servo, integrator, ctrl, q, q_next, v_next, drive)) > servo.limit
+        return np.zeros(np.shape(step.ctrl), dtype=bool)
+    return np.abs(_asked(servo, step)) > servo.limit
 
 
-def applied_torque(
-    servo: Servo | ServoArrays,
-    integrator: Integrator,
-    ctrl: Array,
-    q: Array,
-    q_next: Array,
-    v_next: Array,
-    drive: Drive = "position",
-) -> Array:
-    """Return the motor torque that was applied over a step.
+def applied_torque(servo: Servo | ServoArrays, step: MotorStep) -> Array:
+    """Return the motor torque that was applied over a step [N m], in the step's shape.
 
     The actuator sensor shows kp (u - q), the force before the implicit update; what enters the
     step's momentum balance is, with (q, v) before the step and (q+, v+) after it,
@@ -304,24 +305,12 @@ def applied_torque(
 
     `simulation.limited` keeps the limit so; MuJoCo alone decides with the step's start whether it
     clips.
-
-    Args:
-        servo: The servo.
-        integrator: MuJoCo's integrator of the run.
-        ctrl: Commands u of the step [rad or N m].
-        q: Motor angles before the step [rad].
-        q_next: Motor angles after it [rad].
-        v_next: Motor rates after it [rad/s].
-        drive: Whether commands are angles or torques.
-
-    Returns:
-        Torque of each motor [N m], same shape as the arguments.
     """
-    asked = _asked(servo, integrator, ctrl, q, q_next, v_next, drive)
+    asked = _asked(servo, step)
     if servo.limit is not None:
         asked = np.clip(asked, -servo.limit, servo.limit)
-    passive = servo.kd if _is_kd_passive(servo, drive) else servo.back_emf
-    return asked - passive * v_next
+    passive = servo.kd if _is_kd_passive(servo, step.drive) else servo.back_emf
+    return asked - passive * step.v_next
 
 
 def _back_emf(servo: Servo | ServoArrays) -> float:
@@ -334,18 +323,10 @@ def _is_kd_passive(servo: Servo | ServoArrays, drive: Drive) -> bool:
     return servo.limit is None and drive == "position"
 
 
-def _asked(
-    servo: Servo | ServoArrays,
-    integrator: Integrator,
-    ctrl: Array,
-    q: Array,
-    q_next: Array,
-    v_next: Array,
-    drive: Drive,
-) -> Array:
+def _asked(servo: Servo | ServoArrays, step: MotorStep) -> Array:
     """Return the torque at the end of a step before the limit clips it [N m]."""
-    if drive == "torque":
-        return ctrl
+    if step.drive == "torque":
+        return step.ctrl
     # MuJoCo's `discrete` integrator lets the spring act at the end of the step, not at its start.
-    spring = servo.kp * (ctrl - (q_next if integrator == "discrete" else q))
-    return spring if servo.limit is None else spring - servo.kd * v_next
+    spring = servo.kp * (step.ctrl - (step.q_next if step.integrator == "discrete" else step.q))
+    return spring if servo.limit is None else spring - servo.kd * step.v_next

@@ -48,7 +48,7 @@ class Footing(NamedTuple):
     stiffness: float
 
 
-class Steps(NamedTuple):
+class Course(NamedTuple):
     """What the creep needs of every step of a run.
 
     Attributes:
@@ -66,7 +66,7 @@ class Steps(NamedTuple):
     torque: Array
 
 
-def changes(leg: FiveBar, footing: Footing, steps: Steps) -> Array:
+def changes(leg: FiveBar, footing: Footing, course: Course) -> Array:
     """Return what the creep changes in each motor's torque, as a part of its RMS, (N, 2).
 
     Measured on trots, hops, landings and squats of several legs, gains, rotors and belts, from 0.5
@@ -82,16 +82,16 @@ def changes(leg: FiveBar, footing: Footing, steps: Steps) -> Array:
     Args:
         leg: The leg.
         footing: What holds the foot.
-        steps: The steps of a run.
+        course: The steps of a run.
 
     Raises:
         PoseError: A pose has no Jacobian.
     """
-    sticking = sticks(steps.ground, footing.friction)
-    crept = distance(leg, steps.q, steps.rate_A, sticking, footing.damping, steps.timestep)
-    change = cost(leg, steps.q[:, ::2], crept, footing.stiffness)
+    sticking = sticks(course.ground, footing.friction)
+    crept = distance(leg, course.q, course.rate_A, sticking, footing.damping, course.timestep)
+    change = cost(leg, course.q[:, ::2], crept, footing.stiffness)
 
-    rms = np.sqrt((steps.torque**2).mean(axis=0))
+    rms = np.sqrt((course.torque**2).mean(axis=0))
     # A motor without torque has none to lose.
     return np.divide(change, rms, out=np.zeros_like(change), where=rms > 0.0)
 

@@ -298,7 +298,7 @@ def _creeping(run: Evidence) -> Found | None:
         return None
     high = run.bounds.contact
     record = run.record
-    steps = creep.Steps(
+    course = creep.Course(
         timestep=float(record["time"][0]),
         q=side_by_side(record, JOINT_COLUMNS),
         rate_A=record["theta_dot_A"],
@@ -306,7 +306,7 @@ def _creeping(run: Evidence) -> Found | None:
         torque=motors(record, "torque"),
     )
     try:
-        parts = creep.changes(run.leg, run.footing, steps)
+        parts = creep.changes(run.leg, run.footing, course)
     except PoseError:
         return Found(None, high, None)
     value = float(np.sqrt((parts**2).mean(axis=0)).max())

@@ -9,7 +9,7 @@ import numpy as np
 
 from fivebar_sim import kinematics
 from fivebar_sim.arrays import Array, Bools
-from fivebar_sim.control.servo import Drive, applied_torque
+from fivebar_sim.control.servo import Drive, MotorStep, applied_torque
 from fivebar_sim.control.servo import saturated as clipped
 from fivebar_sim.kinematics.stops import Ranges
 from fivebar_sim.metrics.columns import (
@@ -79,16 +79,21 @@ def _drive(planned: Plan) -> Drive:
 
 def _torque(planned: Plan, part: Part) -> Array:
     """Return the torque that each motor gave in each step [N m], (N, 2)."""
-    scenario = planned.scenario
-    steps = _steps(part)
-    return applied_torque(scenario.servo, scenario.sim.integrator, *steps, _drive(planned))
+    return applied_torque(planned.scenario.servo, _steps(planned, part))
 
 
-def _steps(part: Part) -> tuple[Array, Array, Array, Array]:
-    """Return commands, motor angles before steps, and angles and rates after them, (n, 2) each."""
+def _steps(planned: Plan, part: Part) -> MotorStep:
+    """Return every step as the motors see it, (n, 2)."""
     q, v, ctrl = _joints(part.states)
     before = np.concatenate([part.before[None, -4:], q[:-1]])
-    return ctrl, before[:, MOTOR_JOINTS], q[:, MOTOR_JOINTS], v[:, MOTOR_JOINTS]
+    return MotorStep(
+        integrator=planned.scenario.sim.integrator,
+        ctrl=ctrl,
+        q=before[:, MOTOR_JOINTS],
+        q_next=q[:, MOTOR_JOINTS],
+        v_next=v[:, MOTOR_JOINTS],
+        drive=_drive(planned),
+    )
 
 
 def growth(planned: Plan, record: Record) -> Array | None:
@@ -128,9 +133,7 @@ def ranges(built: mujoco.MjModel) -> Ranges:
 
 def saturated(planned: Plan, part: Part) -> Bools:
     """Return whether the torque limit clipped each motor in each step, (N, 2)."""
-    scenario = planned.scenario
-    steps = _steps(part)
-    return clipped(scenario.servo, scenario.sim.integrator, *steps, _drive(planned))
+    return clipped(planned.scenario.servo, _steps(planned, part))
 
 
 def _surroundings(planned: Plan, part: Part) -> Record:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fivebar_sim.arrays import Array, Bools, as_vectors
-from fivebar_sim.control.servo import ServoArrays, applied_torque
+from fivebar_sim.control.servo import MotorStep, ServoArrays, applied_torque
 from fivebar_sim.control.step import ControlStep
 from fivebar_sim.errors import ArgumentError
 from fivebar_sim.kinematics.leg_arrays import LegArrays
@@ -172,9 +172,8 @@ class Episodes:
 
         before = np.concatenate([self.qpos[:, None, MOTORS_FROM_END], q[:, :-1]], axis=1)
         task = self.task
-        self._torque = applied_torque(
-            self._servo, task.integrator, self._ctrl, before, q, v, task.drive
-        )
+        step = MotorStep(task.integrator, self._ctrl, before, q, v, task.drive)
+        self._torque = applied_torque(self._servo, step)
         # Copies: a view of the last step would keep all steps of the period in memory.
         self._control.moved(q.copy(), v.copy())
         self.qpos = qpos[:, -1].copy()
