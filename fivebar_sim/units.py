@@ -47,6 +47,11 @@ def fitting(number: float, unit: str, digits: int = 4) -> tuple[float, str]:
     return number, names[k]
 
 
+def size(unit: str) -> float:
+    """Return how large a unit of a ladder is in SI: 1e-3 for mW."""
+    return next(ladder[unit] for ladder in LADDERS if unit in ladder)
+
+
 def text(number: float, unit: str, digits: int = 4) -> str:
     """Return a number with the unit that fits its size: "1.167 N m" for 1167 mN m.
 

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from fivebar_sim import units
 from fivebar_sim.arrays import Array
 from fivebar_sim.metrics.catalogue import shown
 from fivebar_sim.metrics.columns import MOTORS
@@ -17,6 +18,7 @@ from fivebar_sim.runs.stored import StoredRun
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 
 def angles(run: StoredRun) -> Drawn:
@@ -47,10 +49,8 @@ def angles(run: StoredRun) -> Drawn:
 
 def speeds(run: StoredRun) -> Drawn:
     """Draw the speeds of both motors."""
-    figure, (ax,) = draw.panels(1, height=2.9)
     lines = {motor: run.record[f"theta_dot_{motor}"] for motor in MOTORS}
-    cut = _both(ax, run, "speed [rad/s]", lines)
-    figure.legend(loc="outside upper center", ncols=2)
+    figure, cut = _both(run, "speed [rad/s]", lines)
     window = run.scenario.window
     most = " and ".join(f"{np.abs(lines[motor][window]).max():.3g} rad/s" for motor in MOTORS)
     no_load = run.scenario.servo.speed
@@ -66,12 +66,12 @@ def speeds(run: StoredRun) -> Drawn:
 
 def power(run: StoredRun) -> Drawn:
     """Draw the mechanical power of both motors."""
-    figure, (ax,) = draw.panels(1, height=2.9)
     given = {motor: numbers.power(run, motor) for motor in MOTORS}
-    scale, unit = (1.0, "W") if np.abs(list(given.values())).max() >= 1.0 else (1e3, "mW")
-    cut = _both(ax, run, f"power [{unit}]", {m: scale * watts for m, watts in given.items()})
-    ax.axhline(0.0, color=colour("muted"), lw=0.8)
-    figure.legend(loc="outside upper center", ncols=2)
+    largest = max(float(np.abs(watts).max()) for watts in given.values())
+    _, unit = units.fitting(1e3 * largest, "mW")
+    lines = {motor: watts / units.size(unit) for motor, watts in given.items()}
+    figure, cut = _both(run, f"power [{unit}]", lines)
+    figure.axes[0].axhline(0.0, color=colour("muted"), lw=0.8)
     work = " and ".join(
         shown("load.work.A.net", look_up(run.metrics, f"load.work.{motor}.net")) for motor in MOTORS
     )
@@ -131,11 +131,14 @@ def _torque_speed_line(ax: Axes, run: StoredRun, fastest: float, largest: float)
     return f" Dash-dotted: the most that the servo gives at each speed, {said}."
 
 
-def _both(ax: Axes, run: StoredRun, label: str, lines: dict[str, Array]) -> bool:
-    """Draw a line of each motor over time; return whether one is cut."""
+def _both(run: StoredRun, label: str, lines: dict[str, Array]) -> tuple[Figure, bool]:
+    """Return a figure with a line of each motor over time, and whether one is cut."""
+    figure, (ax,) = draw.panels(1, height=2.9)
     for motor, values in lines.items():
         draw.line(ax, run.record["time"], values, motor, label=f"motor {motor}")
-    return _over_time(ax, run, label, *lines.values())
+    cut = _over_time(ax, run, label, *lines.values())
+    figure.legend(loc="outside upper center", ncols=2)
+    return figure, cut
 
 
 def _over_time(ax: Axes, run: StoredRun, label: str, *lines: Array) -> bool:
