@@ -10,6 +10,7 @@ from fivebar_sim.dynamics import antagonism
 from fivebar_sim.errors import UnreachableError
 from fivebar_sim.geometry import FiveBar
 from fivebar_sim.kinematics.two_link import SerialLeg
+from fivebar_sim.metrics import load
 
 CLASSIC = FiveBar.load("classic")
 LEGS = [CLASSIC, FiveBar.load("extended")]
@@ -59,5 +60,5 @@ def test_a_foot_out_of_the_serial_legs_reach_is_not_compared() -> None:
         antagonism.price(wide, theta, none, none)
     pairs = {"theta": theta, "theta_dot": none, "torque": none}
     record = {f"{name}_{m}": pair[:, k] for name, pair in pairs.items() for k, m in enumerate("AE")}
-    assert antagonism.heat(wide, record, slice(None)) is None
-    assert antagonism.friction(wide, record, slice(None)) is None
+    assert load.serial_heat(wide, record, slice(None)) is None
+    assert load.serial_friction(wide, record, slice(None)) is None

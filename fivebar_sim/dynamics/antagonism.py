@@ -11,7 +11,6 @@ What the links weigh is not exchanged: the five-bar's own part of tau is carried
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -82,23 +81,3 @@ def _solved(matrix: Array, vector: Array) -> Array:
 def _ratio(own: Array, other: Array) -> float | None:
     most = float(other.sum())
     return float(own.sum()) / most if most > 0.0 else None
-
-
-def _of_record(leg: FiveBar, record: Mapping[str, Array], window: slice) -> Price:
-    columns = ("theta", "theta_dot", "torque")
-    pairs = [np.stack([record[f"{name}_{m}"][window] for m in "AE"], -1) for name in columns]
-    try:
-        return price(leg, *pairs)
-    except FiveBarError:
-        # No serial leg to compare with: it does not reach, or the leg has left its branch.
-        return Price(None, None, None)
-
-
-def heat(leg: FiveBar, record: Mapping[str, Array], window: slice) -> float | None:
-    """Return the copper heat as a multiple of the serial leg's."""
-    return _of_record(leg, record, window).heat
-
-
-def friction(leg: FiveBar, record: Mapping[str, Array], window: slice) -> float | None:
-    """Return the power through the gears as a multiple of the serial leg's."""
-    return _of_record(leg, record, window).friction

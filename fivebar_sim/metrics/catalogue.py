@@ -7,13 +7,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from fivebar_sim import units
 from fivebar_sim.arrays import Array
-from fivebar_sim.dynamics import antagonism
 from fivebar_sim.geometry import FiveBar
-from fivebar_sim.metrics import ground, tracking
+from fivebar_sim.metrics import ground, load, tracking
 from fivebar_sim.metrics.columns import MOTORS
 
 Function = Callable[[FiveBar, Mapping[str, Array], slice], float | None]
@@ -68,43 +67,88 @@ class Metric(NamedTuple):
     same_as: str = ""
 
 
-def _peaks(
-    name: str, label: str, scale: float, unit: str, tolerance: float | None, old: str = ""
+def _both(key: str, label: str, scale: float, unit: str, **others: Any) -> Iterator[Metric]:
+    """Yield a metric of A, then that of E; key and label have {} for the motor."""
+    for motor in MOTORS:
+        yield Metric(key.format(motor), label.format(motor), scale, unit, **others)
+
+
+def _peak(
+    name: str,
+    label: str,
+    scale: float,
+    unit: str,
+    tolerance: float | None = None,
+    *,
+    less: bool = False,
+    old: str = "",
+    old_whole: str = "",
+    function: Function | None = None,
 ) -> Iterator[Metric]:
-    """Yield a peak of both motors over the window, then over the whole run.
+    """Yield a peak over the window, then over the whole run.
 
     Args:
-        name: Name of the peak, of the table `Peaks`.
-        label: Name for people, with {} for the motor.
+        name: Key of the peak in the table `Peaks`.
+        label: Name for people.
         scale: The factor from SI to the shown unit.
         unit: The shown unit.
-        tolerance: Absolute tolerance over the whole run; None where baselines leave it out.
+        tolerance: Absolute tolerance; None where baselines leave the peak out.
+        less: Whether it fails only when it grows.
         old: An older key of the peak over the window: limits and baselines know it by that.
+        old_whole: An older key of the peak over the whole run.
+        function: Measures the peak over the whole run; None where `Peaks` has it.
     """
+    own = old or name
+    whole = old_whole or f"whole.{name}"
     # The whole run's peak sizes a motor, so that is what a baseline watches.
     kept = tolerance if old else None
+    yield Metric(own, label, scale, unit, kept, less_is_better=bool(old), whole=whole)
+
+    if old:
+        yield Metric(name, label, scale, unit, same_as=own)
+
+    yield Metric(
+        key=whole,
+        label=label,
+        scale=scale,
+        unit=unit,
+        tolerance=tolerance,
+        less_is_better=less,
+        function=function,
+        low=-math.inf if function is None else 0.0,
+        window=RUN,
+        at=f"whole.at.{name}",
+    )
+    if old_whole:
+        yield Metric(f"whole.{name}", label, scale, unit, window=RUN, same_as=whole)
+
+
+def _peaks() -> Iterator[Metric]:
+    """Yield the peaks of both motors: torque, speed, power."""
+    for m in MOTORS:
+        old = f"load.torque_peak.{m}"
+        label = f"torque {m} peak"
+        yield from _peak(f"torque_peak.{m}", label, 1e3, "mN m", 1e-6, less=True, old=old)
+    for m in MOTORS:
+        yield from _peak(f"speed_peak.{m}", f"speed {m} peak", 1.0, "rad/s")
+    for m in MOTORS:
+        yield from _peak(f"power_peak.{m}", f"power {m} peak", 1.0, "W", 1e-5, less=True)
+
+
+def _ground_forces() -> Iterator[Metric]:
+    """Yield the largest ground forces along x and z."""
+    for axis in ("x", "z"):
+        label = f"ground force {axis}"
+        old = f"ground.force_max.{axis}"
+        yield from _peak(f"ground_peak.{axis}", label, 1.0, "N", 1e-3, old_whole=old)
+
+
+def _works() -> Iterator[Metric]:
+    """Yield what each motor gave, took, and both together."""
     for motor in MOTORS:
-        called = label.format(motor)
-        own = f"{old or name}.{motor}"
-        whole = f"whole.{name}.{motor}"
-        yield Metric(own, called, scale, unit, kept, less_is_better=bool(old), whole=whole)
-
-        if old:
-            yield Metric(f"{name}.{motor}", called, scale, unit, same_as=own)
-
-        less = tolerance is not None
-        at = f"whole.at.{name}.{motor}"
-        yield Metric(whole, called, scale, unit, tolerance, less, window=RUN, at=at)
-
-
-def _ground_forces(axis: str) -> Iterator[Metric]:
-    """Yield the largest ground force along an axis over the window, then over the whole run."""
-    label = f"ground force {axis}"
-    whole = f"ground.force_max.{axis}"
-    at = f"whole.at.ground_peak.{axis}"
-    yield Metric(f"ground_peak.{axis}", label, 1.0, "N", whole=whole)
-    yield Metric(whole, label, 1.0, "N", tolerance=1e-3, window=RUN, at=at)
-    yield Metric(f"whole.ground_peak.{axis}", label, 1.0, "N", window=RUN, same_as=whole)
+        for way, word in (("positive", "given"), ("negative", "taken"), ("net", "net")):
+            label = f"work {motor} {word}"
+            yield Metric(f"load.work.{motor}.{way}", label, 1e3, "mJ", detail=True)
 
 
 CATALOGUE = (
@@ -139,45 +183,29 @@ CATALOGUE = (
         low=0.0,
         window=RUN,
     ),
-    Metric("gap_peak", "loop gap max", 1e6, "um", whole="closure.max"),
-    Metric(
-        key="closure.max",
+    *_peak(
+        name="gap_peak",
         label="loop gap max",
         scale=1e6,
         unit="um",
         tolerance=1e-9,
-        less_is_better=True,
+        less=True,
+        old_whole="closure.max",
         function=tracking.gap_max,
-        low=0.0,
-        window=RUN,
-        at="whole.at.gap_peak",
     ),
-    Metric("whole.gap_peak", "loop gap max", 1e6, "um", window=RUN, same_as="closure.max"),
-    Metric("load.torque_rms.A", "torque A RMS", 1e3, "mN m", tolerance=1e-6),
-    Metric("load.torque_rms.E", "torque E RMS", 1e3, "mN m", tolerance=1e-6),
-    *_peaks("torque_peak", "torque {} peak", 1e3, "mN m", 1e-6, "load.torque_peak"),
-    *_peaks("speed_peak", "speed {} peak", 1.0, "rad/s", None),
-    *_peaks("power_peak", "power {} peak", 1.0, "W", 1e-5),
-    Metric("load.heat.A", "heat A", 1.0, "W"),
-    Metric("load.heat.E", "heat E", 1.0, "W"),
-    Metric("load.temperature.A", "winding A for good", 1.0, "deg C"),
-    Metric("load.temperature.E", "winding E for good", 1.0, "deg C"),
-    Metric("load.continuous.A", "continuous torque A", 1e2, "%", detail=True),
-    Metric("load.continuous.E", "continuous torque E", 1e2, "%", detail=True),
+    *_both("load.torque_rms.{}", "torque {} RMS", 1e3, "mN m", tolerance=1e-6),
+    *_peaks(),
+    *_both("load.heat.{}", "heat {}", 1.0, "W"),
+    *_both("load.temperature.{}", "winding {} for good", 1.0, "deg C"),
+    *_both("load.continuous.{}", "continuous torque {}", 1e2, "%", detail=True),
     Metric("load.survives", "survives up to 100 %", 1e2, "%"),
-    Metric("load.line.A", "torque-speed line A", 1e2, "%"),
-    Metric("load.line.E", "torque-speed line E", 1e2, "%"),
+    *_both("load.line.{}", "torque-speed line {}", 1e2, "%"),
     # 2e-3 of a share of steps: three steps of 1500.
     Metric("load.share_A", "load share A", 1e2, "%", tolerance=2e-3),
     Metric("load.thermal_share_A", "thermal share A", 1e2, "%", tolerance=2e-3),
     Metric("load.peak_ratio", "peak torque ratio", 1.0, "", detail=True),
     Metric("load.rms_ratio", "torque RMS ratio", 1.0, "", detail=True),
-    Metric("load.work.A.positive", "work A given", 1e3, "mJ", detail=True),
-    Metric("load.work.A.negative", "work A taken", 1e3, "mJ", detail=True),
-    Metric("load.work.A.net", "work A net", 1e3, "mJ", detail=True),
-    Metric("load.work.E.positive", "work E given", 1e3, "mJ", detail=True),
-    Metric("load.work.E.negative", "work E taken", 1e3, "mJ", detail=True),
-    Metric("load.work.E.net", "work E net", 1e3, "mJ", detail=True),
+    *_works(),
     Metric("load.opposing.fraction", "motors opposed", 1e2, "%", detail=True),
     Metric("load.opposing.energy", "energy motor to motor", 1e3, "mJ", detail=True),
     Metric(
@@ -186,7 +214,7 @@ CATALOGUE = (
         scale=1e2,
         unit="%",
         detail=True,
-        function=antagonism.heat,
+        function=load.serial_heat,
         low=0.0,
     ),
     Metric(
@@ -195,29 +223,19 @@ CATALOGUE = (
         scale=1e2,
         unit="%",
         detail=True,
-        function=antagonism.friction,
+        function=load.serial_friction,
         low=0.0,
     ),
-    Metric(
-        key="load.saturated.A",
-        label="motor A saturated",
+    *_both(
+        key="load.saturated.{}",
+        label="motor {} saturated",
         scale=1e2,
         unit="%",
         tolerance=2e-3,
         less_is_better=True,
         hidden_at_zero=True,
     ),
-    Metric(
-        key="load.saturated.E",
-        label="motor E saturated",
-        scale=1e2,
-        unit="%",
-        tolerance=2e-3,
-        less_is_better=True,
-        hidden_at_zero=True,
-    ),
-    *_ground_forces("x"),
-    *_ground_forces("z"),
+    *_ground_forces(),
     Metric("ground.stance_share", "time in stance", 1e2, "%", tolerance=2e-3),
     Metric("ground.slip", "slip in stance", 1e3, "mm", tolerance=1e-6, less_is_better=True),
     Metric("ground.foot_height_max", "foot height max", 1e3, "mm", tolerance=1e-6, window=RUN),

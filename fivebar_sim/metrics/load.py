@@ -5,6 +5,7 @@ The torque is constant over a step, so its work is exactly the torque times the 
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import msgspec
@@ -13,8 +14,10 @@ from numpy.typing import ArrayLike
 
 from fivebar_sim.arrays import Array, Bools, at, first_index
 from fivebar_sim.checks import check_number
-from fivebar_sim.errors import ArgumentError
-from fivebar_sim.metrics.columns import MOTORS
+from fivebar_sim.dynamics import antagonism
+from fivebar_sim.errors import ArgumentError, FiveBarError
+from fivebar_sim.geometry import FiveBar
+from fivebar_sim.metrics.columns import MOTORS, by_motor, motors
 from fivebar_sim.metrics.json_types import Motors
 from fivebar_sim.metrics.sharing import (
     UNDEFINED,
@@ -154,6 +157,25 @@ def moving_share(torque: Array, half: int) -> tuple[Array, Bools]:
     return impulse[loaded, 0] / impulse[loaded].sum(axis=1), loaded
 
 
+def serial_heat(leg: FiveBar, record: Mapping[str, Array], window: slice) -> float | None:
+    """Return the copper heat as a multiple of a serial leg's; see `dynamics.antagonism`."""
+    return _price(leg, record, window).heat
+
+
+def serial_friction(leg: FiveBar, record: Mapping[str, Array], window: slice) -> float | None:
+    """Return the power through the gears as a multiple of a serial leg's."""
+    return _price(leg, record, window).friction
+
+
+def _price(leg: FiveBar, record: Mapping[str, Array], window: slice) -> antagonism.Price:
+    pairs = [motors(record, name)[window] for name in ("theta", "theta_dot", "torque")]
+    try:
+        return antagonism.price(leg, *pairs)
+    except FiveBarError:
+        # No serial leg to compare with: it does not reach, or the leg has left its branch.
+        return antagonism.Price(None, None, None)
+
+
 def _steps(torque: ArrayLike, theta: ArrayLike, timestep: float) -> _Steps:
     """Return the steps of a window, checked."""
     check_number("timestep", timestep, "s", low=0.0, high=LARGEST, strict=True)
@@ -261,7 +283,7 @@ def _ratio(pair: Array, floor: float) -> float | None:
 
 
 def _named(pair: Array) -> Motors:
-    return Motors(**dict(zip(MOTORS, pair.tolist(), strict=True)))
+    return Motors(**by_motor(pair))
 
 
 def _numbers(values: ArrayLike, name: str) -> Array:
