@@ -22,7 +22,7 @@ import oracle
 import oracle_simulation
 from oracle import Array, Leg
 from oracle_simulation import Law, Path
-from scipy.integrate import solve_ivp
+from oracle_trunk import carried, integrated, solved
 
 SETTLED = 1e-4
 """How fast the spring of a sliding foot takes up the force [s]."""
@@ -98,40 +98,12 @@ def accelerations(
 ) -> Array:
     """Return psi_ddot [rad/s^2] and hip_ddot_z [m/s^2], (5,), under a force of the floor.
 
-    With M, h, G of `oracle`, S = sum m J_z of the centres, m the whole mass, J of the foot F:
-
-        M psi_ddot + S hip_ddot - G^T lambda = (tau, 0) - h + J_z^T N + (J_x + r e_2)^T T
-        S psi_ddot + m hip_ddot = m g_z - sum m_i (J_dot psi_dot)_z + N
-        G psi_ddot = -G_dot psi_dot
+    On the right of `oracle_trunk` stand J_z^T N + (J_x + r e_2)^T T, and N for the trunk.
     """
-    S = np.zeros(4)
-    mass = floor.trunk + sum(leg.mass)
-    pull = 0.0
-    for m, (_, arms) in zip(leg.mass, oracle.centres(leg, psi), strict=True):
-        S += m * np.array(oracle.jacobian(arms)[1])
-        pull += m * oracle.centripetal(arms, psi_dot).imag
-
-    loop = oracle.loop(leg, psi)[1]
-    gap = oracle.centripetal(loop, psi_dot)
-    J_x, J_z = (
-        np.array(row, dtype=np.float64) for row in oracle.jacobian(oracle.foot(leg, psi)[1])
-    )
-    J_x[1] += floor.radius
-
-    K = np.zeros((7, 7))
-    K[:4, :4] = oracle.mass_matrix(leg, psi)
-    K[:4, 4] = S
-    K[4, :4] = S
-    K[4, 4] = mass
-    K[5:, :4] = oracle.jacobian(loop)
-    K[:4, 5:] = K[5:, :4].T
-    right = np.zeros(7)
-    right[:4] = np.array([tau[0], 0.0, 0.0, tau[1]]) - oracle.bias(leg, psi, psi_dot)
-    right[:4] += J_z * force.N + J_x * force.T
-    right[4] = mass * leg.gravity.imag - pull + force.N
-    right[5:] = (-gap.real, -gap.imag)
-    found: Array = np.asarray(np.linalg.solve(K, right), dtype=np.float64)
-    return found[:5]
+    own = carried(leg, floor.trunk, floor.radius, psi, psi_dot, tau.tolist())
+    right = own.right + own.up * force.N + own.along * force.T
+    loop, gap = own.loop
+    return solved(own.inertia, loop, right, -gap)[0]
 
 
 def simulate(
@@ -172,14 +144,10 @@ def simulate(
         return [row[2], row[3], ddot[0], ddot[3], row[5], ddot[4], contact.rate]
 
     y0 = [first[0], first[3], 0.0, 0.0, height, 0.0, 0.0]
-    span = (0.0, float(times[-1]))
-    result = solve_ivp(slope, span, y0, "LSODA", times, rtol=1e-7, atol=1e-10)
-    if not result.success:
-        raise RuntimeError(result.message)
-
-    rows = [state(t, row) for t, row in zip(result.t.tolist(), result.y.T, strict=True)]
+    time, states = integrated(slope, y0, times, rtol=1e-7, atol=1e-10)
+    rows = [state(t, row) for t, row in zip(time.tolist(), states, strict=True)]
     return Stance(
-        time=result.t,
+        time=time,
         tau=np.array([row[2] for row in rows]),
         ground=np.array([[row[3].T, row[3].N] for row in rows]),
         slip=np.array([row[4] for row in rows]),

@@ -1,8 +1,7 @@
 """The oracle's stance: the leg under a trunk on a vertical slide, its foot on a rigid level floor.
 
-The hip frame keeps its axes and moves up and down with hip_z, the height of its origin above the
-floor. The foot is a ball of radius r about F, fixed to L2: it touches below F, where the ground
-pushes with (T, N). The floor keeps its height, and if it grips also its place as the ball rolls:
+Trunk and ball are those of `oracle_trunk`. The ground pushes with (T, N) where the ball touches.
+The floor keeps its height, and if it grips also its place as the ball rolls:
 
     hip_z + F_z = r,   and with grip F_x + r psi_2 = constant
 """
@@ -17,7 +16,7 @@ import oracle
 import oracle_simulation
 from oracle import Array, Leg
 from oracle_simulation import Law, Path
-from scipy.integrate import solve_ivp
+from oracle_trunk import carried, integrated, solved
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,11 +64,9 @@ def forward_dynamics(
 ) -> tuple[list[float], float, complex]:
     """Return psi_ddot [rad/s^2], hip_ddot_z [m/s^2] and the ground's force on the foot T + 1j N.
 
-    With M, h, G of `oracle`, S = sum m J_z of the centres, m the whole mass, J of the foot F:
+    To the equations of `oracle_trunk` it adds J_z^T N + (J_x + r e_2)^T T, and N for the trunk:
 
-        M psi_ddot + S hip_ddot - G^T lambda - J_z^T N - (J_x + r e_2)^T T = (tau, 0) - h
-        S psi_ddot + m hip_ddot - N = m g_z - sum m_i (J_dot psi_dot)_z
-        G psi_ddot = -G_dot psi_dot,   J_z psi_ddot + hip_ddot = -(J_dot psi_dot)_z
+        J_z psi_ddot + hip_ddot = -(J_dot psi_dot)_z
         with grip (J_x + r e_2) psi_ddot = -(J_dot psi_dot)_x,   else T = 0
 
     Args:
@@ -79,37 +76,17 @@ def forward_dynamics(
         psi_dot: Their rates [rad/s], which keep it closed (and the foot rolling, with grip).
         tau: Motor torques (tau_A, tau_E) [N m].
     """
-    S = np.zeros(4)
-    mass = ground.trunk + sum(leg.mass)
-    pull = 0.0
-    for m, (_, arms) in zip(leg.mass, oracle.centres(leg, psi), strict=True):
-        S += m * np.array(oracle.jacobian(arms)[1])
-        pull += m * oracle.centripetal(arms, psi_dot).imag
-    arms = oracle.loop(leg, psi)[1]
-    tip = oracle.foot(leg, psi)[1]
-    J_x, J_z = oracle.jacobian(tip)
-    drift = oracle.centripetal(tip, psi_dot)
-    gap = oracle.centripetal(arms, psi_dot)
-    J_x[1] += ground.radius
-    held = [[*row, 0.0] for row in oracle.jacobian(arms)] + [[*J_z, 1.0]]
-    still = [-gap.real, -gap.imag, -drift.imag]
+    own = carried(leg, ground.trunk, ground.radius, psi, psi_dot, tau)
+    loop, gap = own.loop
+    held = [*loop, own.up]
+    still = [*-gap, -own.drift.imag]
     if ground.grips:
-        held = [*held, [*J_x, 0.0]]
-        still = [*still, -drift.real]
+        held = [*held, own.along]
+        still = [*still, -own.drift.real]
 
-    h = oracle.bias(leg, psi, psi_dot)
-    n = 5 + len(held)
-    K = np.zeros((n, n))
-    K[:4, :4] = oracle.mass_matrix(leg, psi)
-    K[:4, 4] = S
-    K[4, :4] = S
-    K[4, 4] = mass
-    K[5:, :5] = held
-    K[:5, 5:] = -np.transpose(held)
-    weight = mass * leg.gravity.imag - pull
-    right = [tau[0] - h[0], -h[1], -h[2], tau[1] - h[3], weight, *still]
-    found = np.linalg.solve(K, right).tolist()
-    return found[:4], found[4], complex(found[8] if ground.grips else 0.0, found[7])
+    ddot, force = solved(own.inertia, np.array(held), own.right, np.array(still))
+    T = float(force[3]) if ground.grips else 0.0
+    return ddot[:4].tolist(), float(ddot[4]), complex(T, float(force[2]))
 
 
 def simulate(
@@ -150,15 +127,12 @@ def simulate(
         return [y[2], y[3], psi_ddot[0], psi_ddot[3]]
 
     y0 = [first[0], first[3], 0.0, 0.0]
-    span = (0.0, float(times[-1]))
-    result = solve_ivp(slope, span, y0, "LSODA", times, rtol=rtol, atol=atol)
-    if not result.success:
-        raise RuntimeError(result.message)
+    at, states = integrated(slope, y0, times, rtol, atol)
     rows = []
-    for t, y in zip(result.t.tolist(), result.y.T.tolist(), strict=True):
+    for t, y in zip(at.tolist(), states.tolist(), strict=True):
         tau = law(leg, path, t, y[:2], y[2:])
         rows.append([*tau, *_row(leg, ground, *_state(leg, y), tau)])
-    return _recorded(result.t, result.y[:2].T.copy(), np.array(rows), first, leg, ground)
+    return _recorded(at, states[:, :2].copy(), np.array(rows), first, leg, ground)
 
 
 def _state(leg: Leg, y: Sequence[float]) -> tuple[list[float], list[float]]:
