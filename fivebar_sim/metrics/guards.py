@@ -9,6 +9,7 @@ that MuJoCo's solver converges.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import Annotated, NamedTuple
 
@@ -31,12 +32,11 @@ from fivebar_sim.metrics.energy import Balance
 from fivebar_sim.metrics.json_types import LARGEST, Amount, Number, Table
 from fivebar_sim.metrics.lasting import chattering, clipped
 
+FAINTEST = 1e-9
+"""Torque below which nothing counts as a jolt [N m]."""
+
 DEGREES = float(np.degrees(1.0))
 """Of a radian."""
-
-
-RATIOS = ("energy", "constraints", "step", "floor", "stops", "contact", "heat", "feedback")
-"""Bounds without a unit that may be above 1."""
 
 
 class Guards(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -63,6 +63,7 @@ class Guards(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
             bears. See `heat.heating`.
         feedback: Largest growth of errors between the commands of a feedback controller that the
             timestep hides, as a power of ten: 1 is tenfold.
+        jolts: Largest torque that lasts a single step, as a part of the largest torque of the run.
     """
 
     loop: float = 0.01
@@ -78,16 +79,15 @@ class Guards(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     contact: float = 0.025
     heat: float = 1.0
     feedback: float = 1.0
+    jolts: float = 0.25
 
     def __post_init__(self) -> None:
-        check_number("loop", self.loop, "", low=0.0)
-        check_number("ground", self.ground, "", low=0.0)
-        check_number("torque", self.torque, "", low=0.0, high=1.0)
-        check_number("chatter", self.chatter, "", low=0.0, high=1.0)
-        check_number("rail", self.rail, "N", low=0.0)
-
-        for part in RATIOS:
-            check_number(part, getattr(self, part), "", low=0.0)
+        for part in self.__struct_fields__:
+            # Of a second; all others have no upper bound.
+            high = 1.0 if part in ("torque", "chatter") else math.inf
+            check_number(
+                part, getattr(self, part), "N" if part == "rail" else "", low=0.0, high=high
+            )
 
 
 class Guard(Table, frozen=True):
@@ -150,6 +150,7 @@ class Evidence(NamedTuple):
         growth: Decades by which errors of the feedback would have grown by each step if commands
             were held as long as a motor holds them, and which the timestep hides, (N,); None
             without feedback.
+        jolts: Torque of A and E that lasts a single step [N m], (N, 2); None in torque drive.
     """
 
     bounds: Guards
@@ -165,6 +166,7 @@ class Evidence(NamedTuple):
     footing: Footing | None = None
     heating: Heating | None = None
     growth: Array | None = None
+    jolts: Array | None = None
 
 
 class Found(NamedTuple):
@@ -268,6 +270,14 @@ def _overheated(run: Evidence) -> Found | None:
 
 def _unstable(run: Evidence) -> Found | None:
     return None if run.growth is None else _highest(run, run.growth, run.bounds.feedback)
+
+
+def _jolted(run: Evidence) -> Found | None:
+    if run.jolts is None:
+        return None
+    # Where nothing moves and nothing weighs, all torque is rounding.
+    largest = max(float(np.abs(motors(run.record, "torque")).max()), FAINTEST)
+    return _highest(run, run.jolts.max(axis=1) / largest, run.bounds.jolts)
 
 
 def _in_floor(run: Evidence) -> Found | None:
@@ -433,6 +443,15 @@ GUARDS = (
         ", by 10^{} at worst: shorten the period or change the gains",
         1.0,
         "",
+    ),
+    Rule(
+        "jolts",
+        _jolted,
+        "a command jumped: a motor's torque went up and back within one step by more than {} of "
+        "the largest",
+        ", by {} at worst: shorten the timestep, or ease path or bus",
+        1e2,
+        "%",
     ),
     Rule(
         "ground",

@@ -1,4 +1,4 @@
-"""What may happen for a moment but must not last: clipped and chattering torque."""
+"""What may happen for a moment but must not last, and torque that must last longer than a step."""
 
 from __future__ import annotations
 
@@ -55,6 +55,26 @@ def chattering(record: Mapping[str, Array], command: int) -> Array:
     chatters = np.zeros(torque.shape, dtype=bool)
     chatters[command:] = d[command:] * d[:-command] < 0.0
     return _sums(chatters, window).max(axis=1) / window
+
+
+def lone(values: Array, before: Array) -> Array:
+    """Return how far each value stands out from both its neighbours on the same side, (N, 2).
+
+    A torque that lasts a single step: no timestep that is any longer than it gets it right.
+
+        min(|x_k - x_k-1|, |x_k - x_k+1|)   where both differences have the same sign, else 0
+
+    Args:
+        values: x of A and E at every step, (N, 2).
+        before: x before the first step, (2,).
+    """
+    d = np.diff(values, axis=0, prepend=before[None])
+    up = d[:-1]
+    down = -d[1:]
+    found = np.zeros_like(values)
+    # Of the last step nobody knows what follows.
+    found[:-1] = np.where(up * down > 0.0, np.minimum(np.abs(up), np.abs(down)), 0.0)
+    return found
 
 
 def _window(time: Array) -> int:

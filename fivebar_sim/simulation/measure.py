@@ -49,6 +49,8 @@ class Unrecorded(NamedTuple):
         trunk: Height of the trunk's lowest point above the hip frame's origin [m].
         growth: Decades by which errors of the feedback would have grown by each step, unseen,
             (N,); None without feedback. See `sampling.Stability.hidden`.
+        jolts: Torque of A and E that lasts a single step [N m], (N, 2); None in torque drive, where
+            a torque lasts as long as the controller's period.
     """
 
     steps: energy.Steps
@@ -58,6 +60,7 @@ class Unrecorded(NamedTuple):
     ranges: Ranges
     trunk: float
     growth: Array | None = None
+    jolts: Array | None = None
 
 
 def measure(scenario: Scenario, record: Mapping[str, Array], besides: Unrecorded) -> Measured:
@@ -93,6 +96,7 @@ def measure(scenario: Scenario, record: Mapping[str, Array], besides: Unrecorded
         footing=_footing(scenario),
         heating=heated,
         growth=besides.growth,
+        jolts=besides.jolts,
     )
 
     window = scenario.window

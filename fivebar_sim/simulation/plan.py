@@ -35,6 +35,7 @@ class Plan(NamedTuple):
             scene "payload", at every step [N], (N, 0 or 2).
         setpoints: The setpoints that reach the motors in every step [rad], (N, 2); None where a
             feedback controller decides during the run.
+        asked: The setpoints as the controller planned them, before the bus [rad], (N, 2).
     """
 
     scenario: Scenario
@@ -43,6 +44,7 @@ class Plan(NamedTuple):
     start: Array
     pushes: Array
     setpoints: Array | None
+    asked: Array | None
 
     @property
     def ctrl(self) -> Array:
@@ -107,8 +109,9 @@ def _complete(scenario: Scenario, wanted: Motion) -> Plan:
         integrator=sim.integrator,
         drive=controller.drive if asked else "position",
     )
-    setpoints = None if asked else _setpoints(scenario, controller, wanted)
-    planned = Plan(scenario, wanted, built, start, pushes, setpoints)
+    table = None if asked else _asked(scenario, controller, wanted)
+    setpoints = None if table is None else _sent(scenario, table, wanted)
+    planned = Plan(scenario, wanted, built, start, pushes, setpoints, table)
 
     # Called for its check alone: a bad period is refused now, not during the run.
     if asked:
@@ -131,8 +134,8 @@ def _above_ground(scenario: Scenario, scene: Ground, q: Array) -> Array:
     return np.array([height, *q])
 
 
-def _setpoints(scenario: Scenario, controller: Setpoints, wanted: Motion) -> Array:
-    """Return the setpoints that the scenario's controller plans, checked and sent over the bus."""
+def _asked(scenario: Scenario, controller: Setpoints, wanted: Motion) -> Array:
+    """Return the setpoints that the scenario's controller plans, checked [rad], (N, 2)."""
     name = scenario.controller_name
     shape = (scenario.steps, 2)
     integrator = scenario.sim.integrator
@@ -144,10 +147,15 @@ def _setpoints(scenario: Scenario, controller: Setpoints, wanted: Motion) -> Arr
         )
 
     _check_near(scenario, ctrl, wanted)
+    return ctrl.astype(np.float64)
+
+
+def _sent(scenario: Scenario, asked: Array, wanted: Motion) -> Array:
+    """Return the setpoints that reach the motors in every step [rad], (N, 2)."""
     bus = Bus([scenario.servo], "position", timestep=scenario.sim.timestep, steps=scenario.steps)
     # Until the first setpoint arrives the servos hold the start pose.
     bus.restart(np.arange(1), wanted.q[:1, ::2])
-    return bus.send_all(ctrl[None].astype(np.float64))[0]
+    return bus.send_all(asked[None])[0]
 
 
 def _check_near(scenario: Scenario, ctrl: NDArray[Any], wanted: Motion) -> None:

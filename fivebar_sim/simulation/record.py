@@ -7,11 +7,12 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
-from fivebar_sim import kinematics
+from fivebar_sim import dynamics, kinematics
 from fivebar_sim.arrays import Array, Bools
 from fivebar_sim.control.servo import Drive, MotorStep, applied_torque
 from fivebar_sim.control.servo import saturated as clipped
 from fivebar_sim.kinematics.stops import Ranges
+from fivebar_sim.metrics import lasting
 from fivebar_sim.metrics.columns import (
     BELT_COLUMN,
     COLUMNS,
@@ -105,6 +106,31 @@ def growth(planned: Plan, record: Record) -> Array | None:
         stands = record["ground_z"] > 0.0
     found = sampling.stability(planned.scenario, planned.motion, angles, rates, stands)
     return None if found is None else found.hidden(record["time"])
+
+
+def jolts(planned: Plan, record: Record) -> Array | None:
+    """Return the torque of each motor that lasts a single step, (N, 2); None in torque drive.
+
+    A bus may miss such a torque, or hold it for many steps, by chance: so what the controller feeds
+    forward counts before the bus.
+    """
+    if _drive(planned) == "torque":
+        return None
+
+    found = lasting.lone(motors(record, "torque"), np.zeros(2))
+    asked = planned.asked
+    if asked is None or np.array_equal(asked, planned.setpoints):
+        return found
+
+    scenario = planned.scenario
+    wanted = planned.motion
+    needed = dynamics.step_torques(
+        scenario.leg, wanted.q, wanted.timestep, wanted.force[:-1], payload=wanted.payload
+    )
+    # In both: the motion needs it, and a setpoint asks for it. One alone may turn round as fast.
+    start = wanted.q[0, MOTOR_JOINTS]
+    fed = scenario.servo.kp * lasting.lone(asked, start)
+    return np.maximum(found, np.minimum(fed, lasting.lone(needed, np.zeros(2))))
 
 
 def lowest(built: mujoco.MjModel) -> float:

@@ -96,6 +96,7 @@ class Recorder:
             ranges=record.ranges(planned.model),
             trunk=record.lowest(planned.model),
             growth=record.growth(planned, self.record),
+            jolts=record.jolts(planned, self.record),
         )
 
     def broken(self, error: DivergedError) -> DivergedError:

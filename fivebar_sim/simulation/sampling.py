@@ -20,6 +20,7 @@ import numpy as np
 from fivebar_sim import dynamics
 from fivebar_sim.arrays import Array, Bools
 from fivebar_sim.control import Feedback, Observation, Reference
+from fivebar_sim.control.delay import in_steps
 from fivebar_sim.control.interface import answer_of, is_numbers
 from fivebar_sim.errors import FiveBarError
 from fivebar_sim.motion import Motion
@@ -45,7 +46,7 @@ class Hold(NamedTuple):
     Attributes:
         timestep: h [s].
         steps: From one command to the next, of the slower of controller and bus.
-        late: From the state that a command answers to its effect.
+        late: From the state that a command answers to its effect, rounded.
     """
 
     timestep: float
@@ -56,9 +57,9 @@ class Hold(NamedTuple):
     def of(cls, scenario: Scenario) -> Hold:
         """Return how a scenario's commands are held."""
         h = scenario.sim.timestep
-        sensors = round(min(scenario.sensors.delay / h, scenario.steps))
-        bus, part = scenario.servo.late(scenario.steps, h)
-        return cls(h, scenario.command, sensors + bus + round(part))
+        delays = (scenario.sensors.delay, scenario.servo.delay)
+        late = sum(sum(in_steps(delay, h, scenario.steps)) for delay in delays)
+        return cls(h, scenario.command, round(late))
 
 
 class Plant(NamedTuple):
