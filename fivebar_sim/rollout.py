@@ -15,7 +15,7 @@ from fivebar_sim.metrics.columns import Record
 from fivebar_sim.metrics.limits import Limit, judge
 from fivebar_sim.metrics.measured import Judged, Verdict, with_verdict
 from fivebar_sim.scenario import Scenario
-from fivebar_sim.simulation import feedback, measure
+from fivebar_sim.simulation import coarse, feedback, measure
 from fivebar_sim.simulation.plan import Plan, period_steps, plan
 from fivebar_sim.simulation.provenance import provenance
 from fivebar_sim.simulation.recorder import Recorder
@@ -69,9 +69,13 @@ class Result(NamedTuple):
 
     @property
     def remarks(self) -> list[str]:
-        """Warnings for people, which change no verdict: the foot does not follow its path."""
+        """Warnings for people, which change no verdict.
+
+        The foot does not follow its path, or numbers owe something to the timestep.
+        """
         astray = tracking.astray(self.scenario.leg, self.record, self.scenario.window)
-        return [] if astray is None else [astray]
+        owed = coarse.warnings(self.scenario, self.record, self.measured.guards)
+        return owed if astray is None else [astray, *owed]
 
     def write(self, path: str | Path) -> Path:
         """Write the run directory; see `run_directory.write`."""

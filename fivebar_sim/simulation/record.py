@@ -119,7 +119,8 @@ def jolts(planned: Plan, record: Record) -> Array | None:
 
     found = lasting.lone(motors(record, "torque"), np.zeros(2))
     asked = planned.asked
-    if asked is None or np.array_equal(asked, planned.setpoints):
+    sent = planned.setpoints
+    if asked is None or sent is None or np.array_equal(asked, sent):
         return found
 
     scenario = planned.scenario
