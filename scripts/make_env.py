@@ -47,8 +47,9 @@ CAUSES = {
     "timed out": NETWORK,
     "(from versions: none)": f"{NETWORK}, or it has no wheel for this Python",
     "No matching distribution": "the package index does not have a release that the lock names",
-    "ensurepip": NO_VENV,
-    "No module named": NO_VENV,
+    "No module named ensurepip": NO_VENV,
+    "No module named venv": NO_VENV,
+    "No module named pip": NO_VENV,
 }
 """What words of pip and venv mean, most telling first."""
 
@@ -60,15 +61,25 @@ class SetUpError(Exception):
 def explain(output: str) -> str:
     """Return the cause of a failure in one line, with the program's own words."""
     lines = [line.strip() for line in output.splitlines() if line.strip()] or ["no output"]
-    errors = [line for line in lines if "ERROR" in line or "Error" in line] or lines
+    errors = [
+        line
+        for line in lines
+        if ("ERROR" in line or "Error" in line) and not line.startswith("WARNING")
+    ] or lines
 
     for sign, meaning in CAUSES.items():
         if sign in output:
-            about = [line for line in lines if "==" in line or sign in line]
-            # of a hash that does not fit pip names the package below, of all else in the same line
+            # of a hash that does not fit pip names the package below the error
+            where = lines if "HASHES" in sign else errors
+            about = [line for line in where if "==" in line or sign in line] or lines
             words = about[-1] if "HASHES" in sign else about[0]
-            return f"{meaning}: {words.removeprefix('ERROR: ')[:200]}"
-    return errors[-1].removeprefix("ERROR: ")[:200]
+            return f"{meaning}: {shortened(words)}"
+    return shortened(errors[-1])
+
+
+def shortened(line: str) -> str:
+    """Return a line of pip as part of another one."""
+    return line.removeprefix("ERROR: ").removesuffix(":")[:200]
 
 
 def call(*command: str | Path) -> str:

@@ -11,7 +11,7 @@ find_python() { # prints the first Python that will do, or says why there is non
     set -- python3 python3.15 python3.14 python3.13 python3.12 python3.11 python
     if [ -n "${PYTHON:-}" ]; then set -- "$PYTHON"; fi
     for candidate; do
-        version=$("$candidate" --version 2>/dev/null) || continue
+        version=$("$candidate" --version 2>&1) || continue # Python 2 says it on stderr
         if ! "$candidate" -c "$fits" 2>/dev/null; then
             seen="${seen:-}, $candidate is $version"
         elif ! "$candidate" -c "$whole" 2>/dev/null; then
@@ -21,7 +21,9 @@ find_python() { # prints the first Python that will do, or says why there is non
             return
         fi
     done
-    echo "fivebar-sim needs Python 3.11 or newer with venv${seen:-, none was found}; set PYTHON to one" >&2
+    none=${PYTHON:+, $PYTHON does not start}
+    seen=${seen:-${none:-, none was found}}
+    echo "fivebar-sim needs Python 3.11 or newer with venv$seen; set PYTHON to one" >&2
     return 1
 }
 

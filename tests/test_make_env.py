@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 import re
+import subprocess
 import sys
 from pathlib import Path
 from types import ModuleType
@@ -147,7 +148,16 @@ def test_pip_resolves_and_builds_nothing(root: Path, pip: Pip) -> None:
             "\nERROR: No matching distribution found for a==9",
             "the package index does not have a release that the lock names: Could not find",
         ),
+        (
+            "WARNING: Retrying after connection broken by 'NewConnectionError(...)': /simple/a/\n"
+            "ERROR: Could not find a version that satisfies a==1 (from versions: none)\n",
+            "the package index cannot be reached (is there a network?): Could not find a version",
+        ),
         ("/usr/bin/python3: No module named ensurepip", "this Python lacks a part of venv or pip"),
+        (
+            "ModuleNotFoundError: No module named 'hatchling'",
+            "ModuleNotFoundError: No module named",
+        ),
         ("Traceback\n  x\nOSError: odd", "OSError: odd"),
         ("", "no output"),
     ],
@@ -155,6 +165,56 @@ def test_pip_resolves_and_builds_nothing(root: Path, pip: Pip) -> None:
 def test_cause_is_one_clear_line(output: str, line: str) -> None:
     assert make_env.explain(output).startswith(line)
     assert "\n" not in make_env.explain(output)
+
+
+def python_like(path: Path, version: str, *refused: str) -> str:
+    """Write a program that says it is a Python, and fails on code with some words."""
+    cases = "".join(f'case "$*" in *"{words}"*) exit 1;; esac\n' for words in refused)
+    path.write_text(f"#!/bin/sh\n{cases}[ $1 = -c ] || echo {version}\n", encoding="utf-8")
+    path.chmod(0o755)
+    return str(path)
+
+
+def found(python: str, path: str) -> subprocess.CompletedProcess[str]:
+    """Return what the shell's search for a Python ends with."""
+    script = (ROOT / "scripts" / "setup.sh").read_text(encoding="utf-8")
+    functions = script[script.index("fits=") : script.index("# The set-up compiles")]
+    environment = {"PYTHON": python, "PATH": path}
+    return subprocess.run(
+        ["/bin/sh", "-c", f"{functions}\nfind_python"],
+        env=environment,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+
+
+def test_first_python_that_will_do_is_taken(tmp_path: Path) -> None:
+    python_like(tmp_path / "python3", "Python 3.9.2", "version_info")
+    python_like(tmp_path / "python3.13", "Python 3.13.1", "ensurepip")
+    python_like(tmp_path / "python3.12", "Python 3.12.1")
+    python_like(tmp_path / "python3.11", "Python 3.11.1")
+    assert found("", str(tmp_path)).stdout == "python3.12\n"
+    chosen = str(tmp_path / "python3.11")
+    assert found(chosen, str(tmp_path)).stdout == f"{chosen}\n"
+
+
+def test_why_no_python_will_do_is_one_line(tmp_path: Path) -> None:
+    old = python_like(tmp_path / "python3", "Python 3.9.2", "version_info")
+    bare = python_like(tmp_path / "python3.13", "Python 3.13.1", "ensurepip")
+    why = {
+        "": "python3 is Python 3.9.2, python3.13 (Python 3.13.1) has no venv (Debian: apt",
+        old: f"{old} is Python 3.9.2; set PYTHON to one",
+        bare: f"{bare} (Python 3.13.1) has no venv",
+        "/no/such": "/no/such does not start; set PYTHON to one",
+    }
+    for python, line in why.items():
+        search = found(python, str(tmp_path))
+        assert search.returncode == 1
+        assert search.stdout == ""
+        assert search.stderr.startswith("fivebar-sim needs Python 3.11 or newer with venv, " + line)
+        assert search.stderr.count("\n") == 1
+    assert "with venv, none was found;" in found("", str(tmp_path / "empty")).stderr
 
 
 def test_failure_of_a_program_is_explained() -> None:
