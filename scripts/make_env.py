@@ -5,8 +5,8 @@
 
 Nothing is resolved: both locks are complete, so pip installs each line of them and no more, only
 from wheels, and only with the locked hashes. What is there already stays; a lock that changed is
-installed anew. The environment says in its file `installed` what it holds. That is written last, so
-that an interrupted set-up is never taken for a whole one.
+installed anew. The environment says in its file `installed` what it holds. A part stands there only
+while nothing works on it, so that an interrupted set-up is never taken for a whole one.
 
 --dry-run prints what pip would install, NAME==VERSION a line.
 
@@ -20,10 +20,14 @@ import hashlib
 import json
 import os
 import shutil
+import signal
 import subprocess
 import sys
 import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
+from typing import NoReturn
 
 LOCKS = {"run": ["requirements.lock"], "dev": ["requirements.lock", "requirements-dev.lock"]}
 """The locks of each set-up, in the order in which they are installed."""
@@ -89,10 +93,31 @@ def call(*command: str | Path) -> str:
     env = {key: value for key, value in os.environ.items() if key not in aside}
     env |= {"PIP_USER": "0", "PIP_REQUIRE_VIRTUALENV": "0"}
 
-    done = subprocess.run([str(part) for part in command], capture_output=True, text=True, env=env)
-    if done.returncode:
-        raise SetUpError(explain(done.stdout + done.stderr))
-    return done.stdout
+    words = [str(part) for part in command]
+    # A group of its own: what pip and venv start ends with them.
+    program = subprocess.Popen(
+        words,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        env=env,
+        start_new_session=True,
+    )
+    try:
+        output, _ = program.communicate()
+    except BaseException:
+        os.killpg(program.pid, signal.SIGKILL)
+        program.wait()
+        raise
+
+    if program.returncode:
+        raise SetUpError(explain(output))
+    return output
+
+
+def interrupt(number: int, frame: object) -> NoReturn:
+    """End as Ctrl-C does: nothing half made stays, and nothing that was started runs on."""
+    raise KeyboardInterrupt
 
 
 def fingerprint(root: Path, *files: str) -> str:
@@ -117,12 +142,20 @@ class Environment:
         except (OSError, ValueError):
             return {}
 
-    def add(self, part: str, mark: str) -> None:
-        """Write down that a part is whole: all of the record, or as it was before."""
-        text = json.dumps(self.holds() | {part: mark}, indent=1)
+    def write(self, marks: dict[str, str]) -> None:
+        """Write the record: all of it, or it stays as it was before."""
         new = self.record.with_suffix(".new")
-        new.write_text(text, encoding="utf-8")
+        new.write_text(json.dumps(marks, indent=1), encoding="utf-8")
         new.replace(self.record)
+
+    @contextmanager
+    def part(self, name: str, mark: str) -> Iterator[None]:
+        """Strike a part from the record while it is worked on; enter it when that is done."""
+        held = self.holds()
+        if held.pop(name, None):
+            self.write(held)
+        yield
+        self.write(held | {name: mark})
 
     def pip(self, *args: str | Path) -> str:
         """Return the output of the environment's own pip."""
@@ -130,9 +163,12 @@ class Environment:
 
     def make(self, pip: str | None) -> None:
         """Make an empty environment, with this Python's pip or another release of it."""
+        self.record.unlink(missing_ok=True)
         if self.place.is_dir():
             shutil.rmtree(self.place)
-        call(sys.executable, "-m", "venv", self.place)
+        # venv would start ensurepip itself, but keep to itself what that says of a failure.
+        call(sys.executable, "-m", "venv", "--without-pip", self.place)
+        call(self.python, "-m", "ensurepip", "--upgrade", "--default-pip")
         if pip:
             self.pip(*INSTALL, "--upgrade", "pip" if pip == "newest" else f"pip=={pip}")
 
@@ -150,25 +186,25 @@ def set_up(root: Path, kind: str, pip: str | None = None) -> None:
         print(f"Setting up .venv with Python {sys.version.split()[0]} ...", flush=True)
         try:
             env.make(pip)
-            env.pip(*INSTALL, *FROM_LOCK, "-r", root / locks[0])
+            with env.part(locks[0], base):
+                env.pip(*INSTALL, *FROM_LOCK, "-r", root / locks[0])
         except BaseException:
             shutil.rmtree(env.place, ignore_errors=True)
             raise
-        env.add(locks[0], base)
 
     for lock in locks[1:]:
         mark = fingerprint(root, locks[0], lock)
         if env.holds().get(lock) != mark:
             print("Adding what the tests need ...", flush=True)
-            env.pip(*INSTALL, *FROM_LOCK, "-r", root / lock)
+            with env.part(lock, mark):
+                env.pip(*INSTALL, *FROM_LOCK, "-r", root / lock)
             say_what_is_left_out()
-            env.add(lock, mark)
 
     mark = fingerprint(root, "pyproject.toml", *locks)
     if env.holds().get("fivebar-sim") != mark:
-        env.pip(*INSTALL, "--no-index", "--no-build-isolation", "--editable", root)
-        env.pip("check", "--disable-pip-version-check")
-        env.add("fivebar-sim", mark)
+        with env.part("fivebar-sim", mark):
+            env.pip(*INSTALL, "--no-index", "--no-build-isolation", "--editable", root)
+            env.pip("check", "--disable-pip-version-check")
 
 
 def say_what_is_left_out() -> None:
@@ -201,6 +237,10 @@ def main() -> int:
     args = parser.parse_args()
 
     root = Path(__file__).resolve().parents[1]
+    for number in (signal.SIGTERM, signal.SIGHUP):
+        if signal.getsignal(number) is not signal.SIG_IGN:  # as under nohup
+            signal.signal(number, interrupt)
+
     try:
         if args.dry_run:
             print("\n".join(would_install(root, args.kind, args.pip)))

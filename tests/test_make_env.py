@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import fcntl
 import importlib.util
 import re
 import subprocess
 import sys
+import time
+from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType
 
@@ -33,12 +36,14 @@ class Pip:
     def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
         self.commands: list[str] = []
         self.fails_on = "nothing"
+        self.watch: Callable[[str], None] = lambda line: None
         monkeypatch.setattr(make_env, "call", self)
 
     def __call__(self, *command: str | Path) -> str:
         """Do as the command would."""
         line = " ".join(str(part) for part in command)
         self.commands.append(line)
+        self.watch(line)
         if self.fails_on in line:
             raise make_env.SetUpError("told to")
         if "-m venv" in line:
@@ -112,6 +117,95 @@ def test_part_that_failed_is_tried_again(root: Path, pip: Pip, step: str) -> Non
     assert any("--editable" in line for line in pip.commands)
     assert any(step in line for line in pip.commands)
     assert "requirements.lock" not in pip.installed()  # that part was whole
+
+
+@pytest.mark.parametrize("file", [*BOTH, "pyproject.toml"])
+def test_part_that_was_cut_off_is_not_in_the_record(root: Path, pip: Pip, file: str) -> None:
+    """Killed outright, and the files then put back: what the record holds fits, or is made anew."""
+    make_env.set_up(root, "dev")
+    before = (root / file).read_text(encoding="utf-8")
+    (root / file).write_text("# newer\n", encoding="utf-8")
+    step = {"requirements.lock": "-m venv", "pyproject.toml": "--editable"}.get(file, "-dev.lock")
+    seen = set[str]()
+
+    def killed(line: str) -> None:
+        if step in line:
+            seen.update(make_env.Environment(root / ".venv").holds())
+            raise KeyboardInterrupt
+
+    pip.watch = killed
+    with pytest.raises(KeyboardInterrupt):
+        make_env.set_up(root, "dev")
+    part = "fivebar-sim" if file == "pyproject.toml" else file
+    assert part not in seen
+
+    (root / file).write_text(before, encoding="utf-8")
+    pip.commands.clear()
+    pip.watch = lambda line: None
+    make_env.set_up(root, "dev")
+    assert any(step in line for line in pip.commands)
+
+
+def test_environment_half_deleted_is_not_in_the_record(
+    root: Path, pip: Pip, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    make_env.set_up(root, "run")
+    (root / "requirements.lock").write_text("# newer\n", encoding="utf-8")
+
+    def killed(*args: object, **options: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(make_env.shutil, "rmtree", killed)
+    with pytest.raises(KeyboardInterrupt):
+        make_env.set_up(root, "run")
+    assert make_env.Environment(root / ".venv").holds() == {}
+
+
+STARTS_ANOTHER = """
+import fcntl, os, signal, subprocess, sys, time
+file = open(sys.argv[1])
+fcntl.flock(file, fcntl.LOCK_EX)
+subprocess.Popen(["sleep", "60"], pass_fds=[file.fileno()])
+os.kill(os.getppid(), signal.SIGTERM)
+time.sleep(60)
+"""
+"""A program that holds a file's lock together with one that it starts, and ends what started it."""
+
+CALLS = """
+import signal, sys
+sys.path.insert(0, sys.argv[1])
+import make_env
+signal.signal(signal.SIGTERM, make_env.interrupt)
+try:
+    make_env.call(sys.executable, "-c", *sys.argv[2:])
+except KeyboardInterrupt:
+    print("interrupted")
+"""
+
+
+def locked(file: Path) -> bool:
+    """Return whether any program still holds a file's lock."""
+    with file.open() as handle:
+        try:
+            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            return True
+    return False
+
+
+def test_signal_ends_all_that_runs(tmp_path: Path) -> None:
+    """Else pip would go on installing into what the next set-up deletes."""
+    file = tmp_path / "held"
+    file.touch()
+    command = [sys.executable, "-c", CALLS, str(ROOT / "scripts"), STARTS_ANOTHER, str(file)]
+    run = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert (run.stdout, run.stderr) == ("interrupted\n", "")
+
+    for _ in range(100):  # the system may take a moment to end it
+        if not locked(file):
+            return
+        time.sleep(0.1)
+    pytest.fail("a program that pip or venv started still runs")
 
 
 def test_pip_resolves_and_builds_nothing(root: Path, pip: Pip) -> None:
