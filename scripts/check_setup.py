@@ -1,9 +1,9 @@
 """./scripts/check_setup [--long] [PYTHON ...]: every pip installs exactly what the locks say.
 
 Offers a newer release of three locked packages from an index of its own, beside the real one, and
-asks the oldest pip what it would install for the tests. --long installs instead of asking, both
-set-ups, each twice in a row, with pip 23.0.1, 23.2.1, 24.0 and the newest, and with every Python
-named, or else with every one on the PATH; each of these takes a minute or two.
+asks the oldest pip what it would install of all locks. --long installs instead of asking, the least
+set-up and the whole one, each twice in a row, with pip 23.0.1, 23.2.1, 24.0 and the newest, and
+with every Python named, or else with every one on the PATH; each of these takes a minute or two.
 """
 
 from __future__ import annotations
@@ -26,7 +26,12 @@ from pathlib import Path
 from packaging.requirements import Requirement
 
 ROOT = Path(__file__).resolve().parents[1]
-LOCKS = {"run": ["requirements.lock"], "dev": ["requirements.lock", "requirements-dev.lock"]}
+LOCKS = {
+    "run": ["requirements.lock"],
+    "lint": ["requirements.lock", "requirements-dev.lock", "requirements-lint.lock"],
+}
+"""The least and the most that is set up; what the tests need lies between."""
+
 PIPS = {"23.0.1": (3, 11), "23.2.1": (3, 12), "24.0": (3, 12), "newest": (3, 99)}
 """The pips that are tried, and the newest Python that each of them runs on."""
 
@@ -202,7 +207,7 @@ def main() -> int:
             version = version_of(python)
             pips = [pip for pip, last in PIPS.items() if version <= last]
             for pip in pips if args.long else pips[:1]:
-                for kind in LOCKS if args.long else ["dev"]:
+                for kind in LOCKS if args.long else ["lint"]:
                     found = check(python, pip, kind, args.long, env)
                     title = f"Python {version[0]}.{version[1]}, pip {pip}, {kind}"
                     print(f"{title}: {'; '.join(found) or 'as locked'}", flush=True)

@@ -1,9 +1,12 @@
-"""python scripts/make_env.py {run,dev} [--pip VERSION] [--dry-run]: makes .venv as the locks say.
+"""python scripts/make_env.py KIND [--pip VERSION] [--dry-run]: makes .venv as the locks say.
+
+KIND is one of
 
     run    requirements.lock: what a run needs
-    dev    requirements-dev.lock besides: what the tests and developers need
+    dev    requirements-dev.lock besides: what the tests need
+    lint   requirements-lint.lock besides: the linters, a sixth of all that is installed
 
-Nothing is resolved: both locks are complete, so pip installs each line of them and no more, only
+Nothing is resolved: the locks are complete, so pip installs each line of them and no more, only
 from wheels, and only with the locked hashes. What is there already stays; a lock that changed is
 installed anew. The environment says in its file `installed` what it holds. A part stands there only
 while nothing works on it, so that an interrupted set-up is never taken for a whole one.
@@ -29,8 +32,15 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import NoReturn
 
-LOCKS = {"run": ["requirements.lock"], "dev": ["requirements.lock", "requirements-dev.lock"]}
+ALL = ["requirements.lock", "requirements-dev.lock", "requirements-lint.lock"]
+LOCKS = {"run": ALL[:1], "dev": ALL[:2], "lint": ALL}
 """The locks of each set-up, in the order in which they are installed."""
+
+ADDS = {ALL[1]: "what the tests need", ALL[2]: "the linters"}
+"""What a lock adds to an environment."""
+
+CHECK = "pip check"
+"""The part of the record that says for which content pip found nothing missing."""
 
 INSTALL = ["install", "--quiet", "--disable-pip-version-check", "--no-input", "--no-deps"]
 """Without pip's resolver, which until 23.3 takes the newest release where an extra is asked for."""
@@ -148,6 +158,11 @@ class Environment:
         new.write_text(json.dumps(marks, indent=1), encoding="utf-8")
         new.replace(self.record)
 
+    def content(self) -> str:
+        """Return what stands for all that is installed."""
+        marks = {name: mark for name, mark in self.holds().items() if name != CHECK}
+        return hashlib.sha256(json.dumps(marks, sort_keys=True).encode()).hexdigest()
+
     @contextmanager
     def part(self, name: str, mark: str) -> Iterator[None]:
         """Strike a part from the record while it is worked on; enter it when that is done."""
@@ -192,18 +207,24 @@ def set_up(root: Path, kind: str, pip: str | None = None) -> None:
             shutil.rmtree(env.place, ignore_errors=True)
             raise
 
-    for lock in locks[1:]:
-        mark = fingerprint(root, locks[0], lock)
+    for number, lock in enumerate(locks[1:], 2):
+        mark = fingerprint(root, *locks[:number])
         if env.holds().get(lock) != mark:
-            print("Adding what the tests need ...", flush=True)
+            print(f"Adding {ADDS[lock]} ...", flush=True)
             with env.part(lock, mark):
                 env.pip(*INSTALL, *FROM_LOCK, "-r", root / lock)
-            say_what_is_left_out()
+            if lock == "requirements-dev.lock":
+                say_what_is_left_out()
 
-    mark = fingerprint(root, "pyproject.toml", *locks)
+    mark = fingerprint(root, "pyproject.toml", locks[0])
     if env.holds().get("fivebar-sim") != mark:
         with env.part("fivebar-sim", mark):
             env.pip(*INSTALL, "--no-index", "--no-build-isolation", "--editable", root)
+
+    # Asked of all that is there, once: a kind that holds less has nothing more to ask.
+    mark = env.content()
+    if env.holds().get(CHECK) != mark:
+        with env.part(CHECK, mark):
             env.pip("check", "--disable-pip-version-check")
 
 

@@ -1,4 +1,4 @@
-# Sourced by demo, test and docs with `kind` set to run or dev: brings .venv to what the locks say.
+# Sourced by demo, test, docs and lint with `kind` set to run, dev or lint: brings .venv to what the locks say.
 # Needs Python 3.11 or newer with venv and pip; PYTHON=... chooses which.
 set -eu
 root=$(CDPATH='' cd -- "$(dirname -- "$0")/.." && pwd)

@@ -65,12 +65,13 @@ def pip(monkeypatch: pytest.MonkeyPatch) -> Pip:
 
 @pytest.fixture
 def root(tmp_path: Path) -> Path:
-    for file in ("pyproject.toml", *make_env.LOCKS["dev"]):
+    for file in ("pyproject.toml", *LOCKS):
         (tmp_path / file).write_text(f"# {file}\n", encoding="utf-8")
     return tmp_path
 
 
 BOTH = ["requirements.lock", "requirements-dev.lock"]
+LOCKS = [*BOTH, "requirements-lint.lock"]
 
 
 def test_each_kind_installs_its_locks_once(root: Path, pip: Pip) -> None:
@@ -78,9 +79,19 @@ def test_each_kind_installs_its_locks_once(root: Path, pip: Pip) -> None:
     assert pip.installed() == ["requirements.lock"]
     make_env.set_up(root, "dev")
     assert pip.installed() == ["requirements-dev.lock"]
-    for kind in ("run", "dev", "run"):
+    make_env.set_up(root, "lint")
+    assert pip.installed() == ["requirements-lint.lock"]
+    for kind in ("run", "dev", "lint", "run"):
         make_env.set_up(root, kind)
-        assert pip.installed() == []
+        assert pip.commands == []
+
+
+def test_whatever_was_installed_is_checked_once(root: Path, pip: Pip) -> None:
+    for kind in ("run", "dev", "lint"):
+        make_env.set_up(root, kind)
+        assert " check" in pip.commands[-1]
+        assert sum(" check" in line for line in pip.commands) == 1
+        pip.commands.clear()
 
 
 def test_lock_that_changed_is_installed_anew(root: Path, pip: Pip) -> None:
@@ -114,8 +125,8 @@ def test_part_that_failed_is_tried_again(root: Path, pip: Pip, step: str) -> Non
     pip.commands.clear()
     pip.fails_on = "nothing"
     make_env.set_up(root, "dev")
-    assert any("--editable" in line for line in pip.commands)
     assert any(step in line for line in pip.commands)
+    assert " check" in pip.commands[-1]
     assert "requirements.lock" not in pip.installed()  # that part was whole
 
 
@@ -326,10 +337,11 @@ def names(file: str) -> set[str]:
 
 
 def test_locks_share_no_package_and_all_is_hashed() -> None:
-    run, dev = (names(file) for file in BOTH)
+    run, dev, lint = (names(file) for file in LOCKS)
     assert {"mujoco", "numpy", "rerun-sdk", "gymnasium", "hatchling"} <= run
-    assert {"pytest", "ruff", "dm-control"} <= dev
-    assert not run & dev
-    for file in BOTH:
+    assert {"pytest", "dm-control"} <= dev
+    assert {"ruff", "basedpyright"} <= lint
+    assert len(run | dev | lint) == len(run) + len(dev) + len(lint)
+    for file in LOCKS:
         entries = re.split(r"^(?=[a-z0-9])", (ROOT / file).read_text("utf-8"), flags=re.MULTILINE)
         assert [e.split()[0] for e in entries[1:] if "--hash=sha256:" not in e] == []
