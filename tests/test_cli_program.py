@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from shell import JUDGED
+from shell import JUDGED, Shell
 
 from fivebar_sim import __version__
 from fivebar_sim.cli import program as fivebar
@@ -59,6 +59,32 @@ def test_output_suits_its_reader(folder: Path) -> None:
             assert process.stderr is not None
             assert process.stderr.read() == b""
         assert process.returncode == 141
+
+
+@pytest.mark.parametrize("columns", ["0", "5", "20"])
+def test_too_few_columns_cut_nothing(
+    shell: Shell, monkeypatch: pytest.MonkeyPatch, columns: str
+) -> None:
+    usual = shell("run", "short.toml", "--out", "mine").out
+    monkeypatch.setenv("COLUMNS", columns)
+    assert shell("run", "short.toml", "--out", "mine").out == usual
+    shell.capture.readouterr()
+    with pytest.raises(SystemExit):
+        fivebar.main(["replay", "--help"])
+    assert "RUN_DIR" in shell.capture.readouterr().out
+    assert os.environ["COLUMNS"] == columns
+
+
+def test_a_closed_stdout_or_stderr_changes_no_status(
+    shell: Shell, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("sys.stdout", None)
+    monkeypatch.setattr("sys.stderr", None)
+    assert fivebar.main(["run", "nowhere.toml"]) == 2
+    for words, status in ((["run", "--help"], 0), (["run", "--nonsense"], 2)):
+        with pytest.raises(SystemExit) as ended:
+            fivebar.main(words)
+        assert ended.value.code == status
 
 
 def test_help_is_quick() -> None:

@@ -102,12 +102,14 @@ def test_a_terminal_gets_our_colours_and_no_others(monkeypatch: pytest.MonkeyPat
     monkeypatch.setattr(sys, "stdout", stream)
     with terminal.output():
         common.screen().print("[green]ok[/green]", "\x1b[5mblinks")
+        common.screen().print("3.14 True http://example.org :apple: 'x'")
         sys.stdout.write("\x1b[5mblinks\n")
         terminal.style(allowed=True)
         sys.stdout.write("\x1b[1mours\n")
         terminal.style(allowed=False)
         sys.stdout.write("\x1b[1mnot\n")
     assert stream.getvalue() == (
-        "\x1b[32mok\x1b[0m \\x1b\x1b[1m[\x1b[0m5mblinks\n\\x1b[5mblinks\n\x1b[1mours\n\\x1b[1mnot\n"
+        "\x1b[32mok\x1b[0m \\x1b[5mblinks\n3.14 True http://example.org :apple: 'x'\n"
+        "\\x1b[5mblinks\n\x1b[1mours\n\\x1b[1mnot\n"
     )
     assert sys.stdout is stream

@@ -17,6 +17,9 @@ if TYPE_CHECKING:
 Scenarios = Positional[Annotated[tuple[str, ...], arg(metavar="[SCENARIO ...]")]]
 Settings = UseAppendAction[Annotated[tuple[str, ...], arg(name="set", metavar="KEY=VALUE")]]
 
+NARROWEST = 80
+"""Columns that tables are laid out for: in fewer, numbers would be cut."""
+
 
 def plans_of(scenarios: Iterable[str], settings: Sequence[str]) -> list[Plan]:
     """Return the plans of all scenarios, so that all are validated before the first one runs."""
@@ -41,7 +44,9 @@ def plans_of(scenarios: Iterable[str], settings: Sequence[str]) -> list[Plan]:
 def screen(*, stderr: bool = False, quiet: bool = False):
     """Return a console for stdout or stderr; a closed pipe raises BrokenPipeError.
 
-    Text is made plain (see `terminal.plain`) before it is coloured; ":words:" do not become emoji.
+    Text is made plain (see `terminal.plain`) before it is coloured; ":words:" do not become emoji, and what
+    looks like a number or an address gets no colour. Tables get the columns that they need, also on
+    a terminal that has fewer.
     """
     from rich.console import Console, ConsoleOptions, RenderableType
     from rich.segment import Segment
@@ -59,7 +64,10 @@ def screen(*, stderr: bool = False, quiet: bool = False):
                 yield part if part.control else part._replace(text=terminal.plain(part.text))
 
     stream = terminal.unwrap(sys.stderr if stderr else sys.stdout)
-    return Screen(file=stream, quiet=quiet, emoji=False)
+    console = Screen(file=stream, quiet=quiet, emoji=False, highlight=False)
+    if not stderr:
+        console.width = max(console.width, NARROWEST)
+    return console
 
 
 def spinner(what: str, *, quiet: bool):

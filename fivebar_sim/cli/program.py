@@ -9,8 +9,9 @@ import functools
 import importlib
 import io
 import os
+import shutil
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from importlib.metadata import version
 from typing import Any
@@ -24,6 +25,9 @@ COMMANDS = ("run", "check", "converge", "replay", "report", "render", "view", "w
 
 HELP = {"-h", "--help"}
 
+FEWEST = 40
+"""Columns of a terminal in which help can be read."""
+
 SAFE = "PYTHONSAFEPATH"
 """The variable with which Python imports nothing from the folder that it is started in."""
 
@@ -34,25 +38,33 @@ def main(argv: Sequence[str] | None = None) -> int:
     # A name may have letters that the terminal's encoding lacks: they must not end the program.
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(errors="backslashreplace")
-    with terminal.output(), _safe_children():
+    with terminal.output(), _environment(_needed()):
         return _main(args)
 
 
-@contextmanager
-def _safe_children() -> Iterator[None]:
-    """Have no Python that is started within import from the user's folder.
+def _needed() -> dict[str, str]:
+    """Return the environment variables that the program needs otherwise than they are."""
+    # No Python that is started within imports from the user's folder. Libraries start some: glfw
+    # one that imports ctypes, and a ctypes.py there would be run.
+    needed = {SAFE: "1"}
+    # The parser would lay out its help for ever in less than eight columns, and rich nothing in 0.
+    if shutil.get_terminal_size().columns < FEWEST:
+        needed["COLUMNS"] = "80"
+    return needed
 
-    Libraries start some: glfw one that imports ctypes, and a ctypes.py there would be run.
-    """
-    before = os.environ.get(SAFE)
-    os.environ[SAFE] = "1"
+
+@contextmanager
+def _environment(changes: Mapping[str, str]) -> Iterator[None]:
+    """Have other environment variables within."""
+    before = {name: os.environ.get(name) for name in changes}
+    os.environ.update(changes)
     try:
         yield
     finally:
-        if before is None:
-            del os.environ[SAFE]
-        else:
-            os.environ[SAFE] = before
+        for name, value in before.items():
+            os.environ.pop(name, None)
+            if value is not None:
+                os.environ[name] = value
 
 
 def _main(args: list[str]) -> int:
@@ -61,8 +73,7 @@ def _main(args: list[str]) -> int:
         with signals.listen():
             status = _call(args)
         # Flushed here, where a closed pipe is still caught, not when Python exits.
-        if sys.stdout:
-            sys.stdout.flush()
+        sys.stdout.flush()
         return status
     except KeyboardInterrupt:
         say("interrupted")

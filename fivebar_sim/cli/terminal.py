@@ -5,6 +5,7 @@ Control characters are escaped in one place, whoever wrote them. Quick to import
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, redirect_stderr, redirect_stdout, suppress
@@ -53,13 +54,12 @@ class Plain:
 
 @contextmanager
 def output() -> Iterator[None]:
-    """Make stdout and stderr plain."""
+    """Make stdout and stderr plain; what is written to one that was closed before is dropped."""
     with ExitStack() as both:
-        # Without a console, as under pythonw, Python has no streams at all.
-        if sys.stdout is not None:
-            both.enter_context(redirect_stdout(Plain(sys.stdout)))  # pyright: ignore[reportArgumentType]
-        if sys.stderr is not None:
-            both.enter_context(redirect_stderr(Plain(sys.stderr)))  # pyright: ignore[reportArgumentType]
+        # Where they are closed, as by `>&-` or under pythonw, Python has none.
+        nowhere = both.enter_context(open(os.devnull, "w", encoding="utf-8"))
+        both.enter_context(redirect_stdout(Plain(sys.stdout or nowhere)))  # pyright: ignore[reportArgumentType]
+        both.enter_context(redirect_stderr(Plain(sys.stderr or nowhere)))  # pyright: ignore[reportArgumentType]
         yield
 
 
