@@ -9,7 +9,7 @@ import pytest
 
 from fivebar_sim import dynamics, kinematics, model
 from fivebar_sim.arrays import Array
-from fivebar_sim.control.servo import Servo, applied_torque
+from fivebar_sim.control.servo import MotorStep, Servo, applied_torque
 from fivebar_sim.integrator import Integrator
 from fivebar_sim.robots import LEGS, Air, Floor, Hip, Robot
 from fivebar_sim.simulation.steps import simulate
@@ -61,7 +61,8 @@ def applied(servo: Servo, integrator: Integrator, ctrl: Array, q: Array, *moved:
     """Return the torques of the motors in each step [N m], (N, 2)."""
     qpos, qvel = (values[:, ::2] for values in moved)
     before = np.concatenate([q[None, ::2], qpos[:-1]])
-    return applied_torque(servo, integrator, ctrl, before, qpos, qvel, "position")
+    step = MotorStep(integrator, ctrl, before, qpos, qvel, "position")
+    return applied_torque(servo, step)
 
 
 def test_standing_robot_weighs_what_it_weighs() -> None:

@@ -44,9 +44,9 @@ def plans_of(scenarios: Iterable[str], settings: Sequence[str]) -> list[Plan]:
 def screen(*, stderr: bool = False, quiet: bool = False):
     """Return a console for stdout or stderr; a closed pipe raises BrokenPipeError.
 
-    Text is made plain (see `terminal.plain`) before it is coloured; ":words:" do not become emoji, and what
-    looks like a number or an address gets no colour. Tables get the columns that they need, also on
-    a terminal that has fewer.
+    Text is made plain (see `terminal.plain`) before it is coloured; ":words:" do not become emoji,
+    and what looks like a number or an address gets no colour. Tables get the columns that they
+    need, also on a terminal that has fewer.
     """
     from rich.console import Console, ConsoleOptions, RenderableType
     from rich.segment import Segment
