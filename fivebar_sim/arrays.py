@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -9,6 +11,16 @@ from fivebar_sim.errors import ArgumentError
 
 Array = NDArray[np.float64]
 Bools = NDArray[np.bool_]
+
+
+ROWS = 4096
+"""Rows of a long array that are computed at once, so that what comes up meanwhile stays small."""
+
+
+def blocks(rows: int) -> Iterator[slice]:
+    """Yield the slices of at most `ROWS` rows that make up all rows."""
+    for start in range(0, rows, ROWS):
+        yield slice(start, min(start + ROWS, rows))
 
 
 def first_index(bad: Bools) -> tuple[int, ...]:

@@ -60,5 +60,4 @@ def test_a_foot_out_of_the_serial_legs_reach_is_not_compared() -> None:
         antagonism.price(wide, theta, none, none)
     pairs = {"theta": theta, "theta_dot": none, "torque": none}
     record = {f"{name}_{m}": pair[:, k] for name, pair in pairs.items() for k, m in enumerate("AE")}
-    assert load.serial_heat(wide, record, slice(None)) is None
-    assert load.serial_friction(wide, record, slice(None)) is None
+    assert load.serial(wide, record, slice(None)) == (None, None, None)

@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from fivebar_sim import kinematics
-from fivebar_sim.arrays import Array
+from fivebar_sim.arrays import Array, blocks
 from fivebar_sim.errors import FiveBarError
 from fivebar_sim.geometry import FiveBar
 from fivebar_sim.kinematics.two_link import SerialLeg
@@ -54,19 +54,27 @@ def price(leg: FiveBar, theta: Array, omega: Array, torque: Array) -> Price:
     Raises:
         FiveBarError: The serial leg does not reach a foot point, or a pose is open or singular.
     """
-    serial = serial_leg(leg)
-    foot = kinematics.forward(leg, theta)
-    J = kinematics.jacobian(leg, theta)
-    S = serial.jacobian(serial.inverse(foot))
-    force = _solved(np.swapaxes(J, -1, -2), torque)
-    tau_s = np.einsum("nij,ni->nj", S, force)
-    omega_s = _solved(S, np.einsum("nij,nj->ni", J, omega))
+    tau_s = np.empty_like(torque)
+    omega_s = np.empty_like(omega)
+    for rows in blocks(len(theta)):
+        tau_s[rows], omega_s[rows] = _serial(leg, theta[rows], omega[rows], torque[rows])
 
     return Price(
         heat=_ratio(torque**2, tau_s**2),
         friction=_ratio(np.abs(torque * omega), np.abs(tau_s * omega_s)),
         turning=_ratio(np.abs(omega), np.abs(omega_s)),
     )
+
+
+def _serial(leg: FiveBar, theta: Array, omega: Array, torque: Array) -> tuple[Array, Array]:
+    """Return the serial leg's torques and rates, (N, 2); see `price`."""
+    serial = serial_leg(leg)
+    foot = kinematics.forward(leg, theta)
+    J = kinematics.jacobian(leg, theta)
+    S = serial.jacobian(serial.inverse(foot))
+    force = _solved(np.swapaxes(J, -1, -2), torque)
+    tau_s = np.einsum("nij,ni->nj", S, force)
+    return tau_s, _solved(S, np.einsum("nij,nj->ni", J, omega))
 
 
 def _solved(matrix: Array, vector: Array) -> Array:

@@ -5,14 +5,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fivebar_sim.arrays import Array, Bools, as_pairs, at, first_index
+from fivebar_sim.arrays import Array, Bools, as_pairs, at, blocks, first_index
 from fivebar_sim.errors import ArgumentError, UnreachableError
 from fivebar_sim.geometry import MODES, FiveBar, Mode
 from fivebar_sim.kinematics.closure import ROUNDING, Points, bases, knees
 from fivebar_sim.kinematics.planar import direction, turned, unit, wrap
-
-BLOCK = 4096
-"""Number of points solved at a time: temporaries stay in the cache, which is three times faster."""
 
 
 def side_angle(r: Array, near: float, far: float, s: int) -> tuple[Array, Bools]:
@@ -98,8 +95,8 @@ def solve(leg: FiveBar, foot: Array, mode: Mode) -> tuple[Array, Bools]:
     ok = np.empty(flat.shape, dtype=bool)
     # Squares of far points may overflow to inf, which is out of reach like any other.
     with np.errstate(over="ignore", invalid="ignore"):
-        for start in range(0, len(flat), BLOCK):
-            block = slice(start, start + BLOCK)
+        # A block at a time: temporaries stay in the cache, which is three times faster.
+        for block in blocks(len(flat)):
             angles, reached = _solve(leg, flat[block], mode)
             for side in (0, 1):
                 theta[block, side] = angles[side]

@@ -9,7 +9,7 @@ import msgspec
 import numpy as np
 
 from fivebar_sim import kinematics
-from fivebar_sim.arrays import Array
+from fivebar_sim.arrays import Array, blocks
 from fivebar_sim.geometry import FiveBar
 from fivebar_sim.metrics.columns import JOINT_COLUMNS, side_by_side
 from fivebar_sim.metrics.json_types import Amount, Count, Sign, Table
@@ -36,12 +36,15 @@ def measure(leg: FiveBar, record: Mapping[str, Array]) -> Branch:
 
     Every step is compared with the one before, the first with the leg's own branch.
     """
-    q = side_by_side(record, JOINT_COLUMNS)
-    signs = np.stack(kinematics.branch(leg, kinematics.chain_points(leg, q)), axis=-1)
+    signs = np.empty((3, len(record["time"])), dtype=np.int8)
+    for rows in blocks(signs.shape[1]):
+        q = side_by_side({name: record[name][rows] for name in JOINT_COLUMNS}, JOINT_COLUMNS)
+        signs[:, rows] = kinematics.branch(leg, kinematics.chain_points(leg, q))
+
     # Beginning with the leg's own branch, a start in another one counts as a flip.
-    own = np.array([*leg.mode, leg.assembly])
-    flipped = np.any(np.diff(signs, axis=0, prepend=own[None]) != 0, axis=-1)
-    s_A, s_E, assembly = signs[-1].tolist()
+    own = np.array([[*leg.mode, leg.assembly]], dtype=np.int8).T
+    flipped = np.any(np.diff(signs, axis=1, prepend=own) != 0, axis=0)
+    s_A, s_E, assembly = signs[:, -1].tolist()
     return Branch(
         working_mode=[s_A, s_E],
         assembly=assembly,

@@ -15,8 +15,9 @@ from fivebar_sim.geometry import FiveBar
 from fivebar_sim.metrics import ground, load, tracking
 from fivebar_sim.metrics.columns import MOTORS
 
-Function = Callable[[FiveBar, Mapping[str, Array], slice], float | None]
-"""Takes the leg, the record and the rows to measure; None is undefined."""
+Function = Callable[[FiveBar, Mapping[str, Array], slice], Any]
+"""Takes the leg, the record and the rows to measure; returns a number, None where it is undefined,
+or what has a number for each of several rows: see `Metric.part`."""
 
 WINDOW = "measured window"
 """Whole periods after the ramp, or all of a landing: see `Scenario.window`."""
@@ -42,6 +43,8 @@ class Metric(NamedTuple):
         hidden_at_zero: Shown only where it has a limit or is not 0.
         function: Measures it. None where a table of metrics is measured as a whole: load, peaks,
             ground, energy and branch.
+        part: The attribute of what the function returns; "" where that is the number itself. One
+            call measures all rows that have the function.
         low: Lowest possible value of a row with a function; metrics.json with a lower one is
             refused.
         window: What it is measured over: `WINDOW` or `RUN`.
@@ -60,6 +63,7 @@ class Metric(NamedTuple):
     detail: bool = False
     hidden_at_zero: bool = False
     function: Function | None = None
+    part: str = ""
     low: float = -math.inf
     window: str = WINDOW
     whole: str = ""
@@ -214,7 +218,8 @@ CATALOGUE = (
         scale=1e2,
         unit="%",
         detail=True,
-        function=load.serial_heat,
+        function=load.serial,
+        part="heat",
         low=0.0,
     ),
     Metric(
@@ -223,7 +228,8 @@ CATALOGUE = (
         scale=1e2,
         unit="%",
         detail=True,
-        function=load.serial_friction,
+        function=load.serial,
+        part="friction",
         low=0.0,
     ),
     *_both(
@@ -347,6 +353,8 @@ def measure(
         window: The rows of the measured window.
     """
     tables: dict[str, dict[str, float | None]] = {}
+    found: dict[tuple[Function, str], Any] = {}
+
     for metric in MEASURED:
         # No floor, no metric of it: a 0 would look measured.
         if metric.key in GROUND_KEYS and "ground_z" not in record:
@@ -354,5 +362,9 @@ def measure(
         assert metric.function is not None
         table, _, name = metric.key.partition(".")
         rows = slice(None) if metric.window == RUN else window
-        tables.setdefault(table, {})[name] = metric.function(leg, record, rows)
+        asked = (metric.function, metric.window)
+        if asked not in found:
+            found[asked] = metric.function(leg, record, rows)
+        value = getattr(found[asked], metric.part) if metric.part else found[asked]
+        tables.setdefault(table, {})[name] = value
     return tables

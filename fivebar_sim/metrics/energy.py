@@ -19,22 +19,23 @@ from typing import NamedTuple
 import numpy as np
 
 from fivebar_sim import kinematics
-from fivebar_sim.arrays import Array
-from fivebar_sim.dynamics.chain import Chain, Pose, Vector, placed
+from fivebar_sim.arrays import Array, blocks
+from fivebar_sim.dynamics.chain import Chain, Four, Pose, Vector, placed
 from fivebar_sim.geometry import FiveBar
-from fivebar_sim.kinematics.planar import end_velocity
 from fivebar_sim.metrics.columns import (
     JOINT_COLUMNS,
     MOTOR_JOINTS,
     RATE_COLUMNS,
-    motors,
-    side_by_side,
+    TORQUE_COLUMNS,
 )
 from fivebar_sim.metrics.ground import contact_radius
 from fivebar_sim.metrics.json_types import Amount, Number, Table
 
 STILL = 1e-8
 """Angle that no joint turns by in a leg that only stands [rad]; its balance would be rounding."""
+
+Joints = tuple[Array, ...]
+"""An angle or a rate of each of the joints A, B, E, D."""
 
 
 class Body(NamedTuple):
@@ -139,43 +140,48 @@ class Energy(Table, frozen=True):
 
 
 class _Motion(NamedTuple):
-    """The motion at t = 0 and after each step, (N + 1, ...), and the mean rates of steps, (N, ...).
+    """The motion before n steps and after each, n + 1 rows, and the mean rates of steps, n rows.
 
     Attributes:
-        q: Joint angles as in `mechanical` [rad], (N + 1, 4).
-        v: Their rates [rad/s], (N + 1, 4).
-        hip: Height of the hip frame [m], (N + 1,).
-        hip_dot: Its rate [m/s], (N + 1,).
-        w: Mean joint rates of each step [rad/s], (N, 4).
-        lift: Mean rate of the hip [m/s], (N,).
+        q: Angle of each joint as in `mechanical` [rad], (n + 1,) each.
+        v: Their rates [rad/s], (n + 1,) each.
+        hip: Height of the hip frame [m], (n + 1,).
+        hip_dot: Its rate [m/s], (n + 1,).
+        w: Mean joint rates of each step [rad/s], (n,) each.
+        lift: Mean rate of the hip [m/s], (n,).
     """
 
-    q: Array
-    v: Array
+    q: Joints
+    v: Joints
     hip: Array
     hip_dot: Array
-    w: Array
+    w: Joints
     lift: Array
 
     @classmethod
-    def of(cls, record: Mapping[str, Array], start: Array) -> _Motion:
-        """Return the motion of a record that began at rest."""
-        q = side_by_side(record, JOINT_COLUMNS)
-        v = side_by_side(record, RATE_COLUMNS)
-        q = _begun(start[-4:], q)
-        v = _begun(np.zeros(4), v)
+    def of(cls, record: Mapping[str, Array], start: Array, rows: slice) -> _Motion:
+        """Return the motion in some steps of a record that began at rest."""
+        begun = zip(JOINT_COLUMNS, start[-4:], strict=True)
+        q = tuple(_begun(record[name], rows, at) for name, at in begun)
+        v = tuple(_begun(record[name], rows) for name in RATE_COLUMNS)
         # A fixed hip is a hip at height 0 that never moves.
-        hip, hip_dot = np.zeros((2, len(q)))
+        hip, hip_dot = np.zeros((2, len(q[0])))
         if "hip_z" in record:
-            hip = _begun(start[0], record["hip_z"])
-            hip_dot = _begun(0.0, record["hip_dot_z"])
-        return cls(q, v, hip, hip_dot, 0.5 * (v[1:] + v[:-1]), 0.5 * (hip_dot[1:] + hip_dot[:-1]))
+            hip = _begun(record["hip_z"], rows, start[0])
+            hip_dot = _begun(record["hip_dot_z"], rows)
+        return cls(q, v, hip, hip_dot, tuple(_mean(each) for each in v), _mean(hip_dot))
 
-    def turned(self, leg: FiveBar) -> bool:
-        """Return whether a joint turned by more than `STILL`, or the hip rose by as much."""
-        # A part of the leg's size for the hip: the rule is the same for legs of any size.
-        most = max(float(np.ptp(self.q, axis=0).max()), float(np.ptp(self.hip)) / leg.size)
-        return most > STILL
+
+class _Works(NamedTuple):
+    """The columns of `Balance`, of some steps."""
+
+    motor: Array
+    force: Array
+    ground: Array
+    constraints: Array
+    step: Array
+    kinetic: Array
+    potential: Array
 
 
 def balance(body: Body, record: Mapping[str, Array], steps: Steps) -> Balance:
@@ -187,48 +193,83 @@ def balance(body: Body, record: Mapping[str, Array], steps: Steps) -> Balance:
         steps: What acted besides the motors.
     """
     leg = body.leg
-    h = float(record["time"][0])
-    m = _Motion.of(record, steps.start)
-    # Rates belong to the middle of the step that they moved the leg by; see above.
-    kinetic, potential = mechanical(
-        body, m.q - 0.5 * h * m.v, m.v, m.hip - 0.5 * h * m.hip_dot, m.hip_dot
-    )
-    torque = motors(record, "torque")
-    foot = foot_rates(leg, m.q[:-1], m.w)
-    none = np.zeros(len(m.w))
-    ground = none
+    rows = len(record["time"])
+    works = _Works(*np.empty((len(_Works._fields), rows)))
+    for part in blocks(rows):
+        for whole, values in zip(works, _works(body, record, steps, part), strict=True):
+            whole[part] = values
 
-    if "ground_z" in record:
-        height = m.hip[:-1] + kinematics.chain_points(leg, m.q[:-1]).F[:, 1] - leg.foot_radius
-        rolled = contact_radius(leg, height) * (m.w[:, 0] + m.w[:, 1])
-        # The force acts on the ball's lowest point, which also rolls.
-        x = foot[:, 0] + rolled
-        z = foot[:, 1] + m.lift
-        ground = h * (record["ground_x"] * x + record["ground_z"] * z)
-
-    joints = np.column_stack([m.lift, m.w]) if "hip_z" in record else m.w
     return Balance(
-        motor=h * np.sum(torque * m.w[:, MOTOR_JOINTS], axis=-1),
-        force=h * np.sum(steps.force * foot, axis=-1) if steps.force.size else none,
-        ground=ground,
-        constraints=h * np.sum(steps.constraint * joints, axis=-1) - ground,
-        step=h * _given_away(body, m),
-        kinetic=np.diff(kinetic),
-        potential=np.diff(potential),
-        moved=m.turned(leg),
+        **works._asdict(),
+        moved=_turned(leg, record, steps.start),
         lift=body.mass * float(np.hypot(*leg.gravity)) * leg.size,
     )
 
 
-def _given_away(body: Body, m: _Motion) -> Array:
+def _works(body: Body, record: Mapping[str, Array], steps: Steps, rows: slice) -> _Works:
+    """Return the works of some steps, and what the energies gained; see `balance`."""
+    leg = body.leg
+    h = float(record["time"][0])
+    m = _Motion.of(record, steps.start, rows)
+    # Rates belong to the middle of the step that they moved the leg by; see above.
+    middle = tuple(q - 0.5 * h * v for q, v in zip(m.q, m.v, strict=True))
+    kinetic, potential = _energies(body, middle, m.v, m.hip - 0.5 * h * m.hip_dot, m.hip_dot)
+    pose = _open_pose(tuple(q[:-1] for q in m.q))
+    x, z = _foot_rates(leg, pose, m.w[0], m.w[0] + m.w[1])
+    none = np.zeros(len(m.lift))
+    force = none
+    if steps.force.size:
+        force = h * (steps.force[rows, 0] * x + steps.force[rows, 1] * z)
+
+    ground = none
+    if "ground_z" in record:
+        first = kinematics.chain_points(leg, steps.start[-4:]).F[1]
+        height = m.hip[:-1] + _begun(record["foot_z"], rows, first)[:-1] - leg.foot_radius
+        rolled = contact_radius(leg, height) * (m.w[0] + m.w[1])
+        # The force acts on the ball's lowest point, which also rolls.
+        ground = h * (
+            record["ground_x"][rows] * (x + rolled) + record["ground_z"][rows] * (z + m.lift)
+        )
+
+    joints = np.column_stack([m.lift, *m.w] if "hip_z" in record else m.w)
+    torque_A, torque_E = (record[name][rows] for name in TORQUE_COLUMNS)
+    return _Works(
+        motor=h * (torque_A * m.w[MOTOR_JOINTS[0]] + torque_E * m.w[MOTOR_JOINTS[1]]),
+        force=force,
+        ground=ground,
+        constraints=h * np.sum(steps.constraint[rows] * joints, axis=-1) - ground,
+        step=h * _given_away(body, m, pose),
+        kinetic=np.diff(kinetic),
+        potential=np.diff(potential),
+    )
+
+
+def _turned(leg: FiveBar, record: Mapping[str, Array], start: Array) -> bool:
+    """Return whether a joint turned by more than `STILL`, or the hip rose by as much."""
+    turns = [_range(record[name], at) for name, at in zip(JOINT_COLUMNS, start[-4:], strict=True)]
+    # A part of the leg's size for the hip: the rule is the same for legs of any size.
+    rise = _range(record["hip_z"], start[0]) / leg.size if "hip_z" in record else 0.0
+    return max(*turns, rise) > STILL
+
+
+def _range(values: Array, start: float) -> float:
+    """Return how far values, and what they began with, are apart."""
+    return float(max(values.max(), start) - min(values.min(), start))
+
+
+def _given_away(body: Body, m: _Motion, p: Pose) -> Array:
     """Return -(c(q, v) - c(q, w)) . w of every step [W], v the rates at its start, (N,).
 
     c is that of the links' own directions, and of the hip, which a link's moment r about its joint
     pushes down by r_z psi_dot^2.
+
+    Args:
+        body: What moves.
+        m: Its motion.
+        p: The poses before each step.
     """
     chain = Chain.of(body.leg, None, body.payload)
-    p = _open_pose(m.q[:-1])
-    v = _of_links(m.v[:-1])
+    v = tuple(rate[:-1] for rate in _of_links(m.v))
     w = _of_links(m.w)
     still = (0.0, 0.0, 0.0, 0.0)
     at_start = chain.link_torques(p, v, still)
@@ -255,6 +296,13 @@ def mechanical(
         hip: Height of the hip frame [m], (...).
         hip_dot: Its rate [m/s], (...).
     """
+    return _energies(body, _columns(q), _columns(v), hip, hip_dot)
+
+
+def _energies(
+    body: Body, q: Joints, v: Joints, hip: Array | float, hip_dot: Array | float
+) -> tuple[Array, Array]:
+    """Return what `mechanical` does, of each joint's angles and rates (...)."""
     chain = Chain.of(body.leg, None, body.payload)
     p = _open_pose(q)
     w = _of_links(v)
@@ -277,11 +325,15 @@ def foot_rates(leg: FiveBar, q: Array, v: Array) -> Array:
         q: Joint angles as in `mechanical` [rad], (..., 4).
         v: Their rates [rad/s], (..., 4).
     """
-    psi_1 = q[..., 0]
-    psi_2 = q[..., 0] + q[..., 1]
-    AB = np.stack([leg.L1 * np.cos(psi_1), leg.L1 * np.sin(psi_1)], axis=-1)
-    BF = np.stack(placed((np.cos(psi_2), np.sin(psi_2)), leg.foot_offset), axis=-1)
-    return end_velocity(AB, BF, v[..., 0], v[..., 0] + v[..., 1])
+    pose = _open_pose(_columns(q))
+    return np.stack(_foot_rates(leg, pose, v[..., 0], v[..., 0] + v[..., 1]), axis=-1)
+
+
+def _foot_rates(leg: FiveBar, p: Pose, psi_1_dot: Array, psi_2_dot: Array) -> tuple[Array, Array]:
+    """Return what `foot_rates` does, x and z, of poses and the rates of L1 and L2."""
+    BF = placed(p.e2, leg.foot_offset)
+    x = -(leg.L1 * p.e1[1]) * psi_1_dot - BF[1] * psi_2_dot
+    return x, leg.L1 * p.e1[0] * psi_1_dot + BF[0] * psi_2_dot
 
 
 def measure(found: Balance) -> Energy:
@@ -294,17 +346,29 @@ def measure(found: Balance) -> Energy:
     return Energy(**net, turnover=found.turnover, imbalance=found.imbalance)
 
 
-def _open_pose(q: Array) -> Pose:
+def _open_pose(q: Joints) -> Pose:
     """Return the directions of the links at joint angles as in `mechanical`."""
     return Pose(*((np.cos(psi), np.sin(psi)) for psi in _of_links(q)))
 
 
-def _of_links(q: Array) -> tuple[Array, Array, Array, Array]:
+def _of_links(q: Joints) -> Four:
     """Return psi_1..psi_4, the links' own directions, of joint angles; or their rates, of rates."""
-    A, B, E, D = (q[..., i] for i in range(4))
+    A, B, E, D = q
     return A, A + B, E + D, E
 
 
-def _begun(start: Array | float, after: Array) -> Array:
-    """Return values after each step with those before the first one."""
-    return np.concatenate([np.broadcast_to(start, after[:1].shape), after])
+def _columns(q: Array) -> Joints:
+    """Return each joint's part of (..., 4)."""
+    return q[..., 0], q[..., 1], q[..., 2], q[..., 3]
+
+
+def _mean(rate: Array) -> Array:
+    """Return the means over steps of rates before and after them, (n + 1,) to (n,)."""
+    return 0.5 * (rate[1:] + rate[:-1])
+
+
+def _begun(after: Array, rows: slice, start: float = 0.0) -> Array:
+    """Return values after some steps, with the one before the first of them, (n + 1,)."""
+    if rows.start > 0:
+        return after[rows.start - 1 : rows.stop]
+    return np.concatenate([[start], after[rows]])

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from fivebar_sim import kinematics
-from fivebar_sim.arrays import Array, Bools
+from fivebar_sim.arrays import Array, Bools, blocks
 from fivebar_sim.geometry import FiveBar
 from fivebar_sim.metrics.columns import JOINT_COLUMNS, side_by_side
 from fivebar_sim.metrics.json_types import Amount, Number, Part, Table
@@ -51,6 +51,17 @@ def depths(leg: FiveBar, record: Mapping[str, Array], trunk: float) -> dict[str,
         record: The columns of rollout.parquet.
         trunk: Height of the trunk's lowest point above the hip frame's origin [m].
     """
+    found: dict[str, Array] = {}
+    rows = len(record["time"])
+    for part in blocks(rows):
+        some = {name: record[name][part] for name in (*JOINT_COLUMNS, "hip_z")}
+        for name, depth in _depths(leg, some, trunk).items():
+            found.setdefault(name, np.empty(rows))[part] = depth
+    return found
+
+
+def _depths(leg: FiveBar, record: Mapping[str, Array], trunk: float) -> dict[str, Array]:
+    """Return what `depths` does, all rows at once."""
     q = side_by_side(record, JOINT_COLUMNS)
     points = kinematics.chain_points(leg, q)
     A, E = kinematics.bases(leg)

@@ -157,22 +157,16 @@ def moving_share(torque: Array, half: int) -> tuple[Array, Bools]:
     return impulse[loaded, 0] / impulse[loaded].sum(axis=1), loaded
 
 
-def serial_heat(leg: FiveBar, record: Mapping[str, Array], window: slice) -> float | None:
-    """Return the copper heat as a multiple of a serial leg's; see `dynamics.antagonism`."""
-    return _price(leg, record, window).heat
+def serial(leg: FiveBar, record: Mapping[str, Array], window: slice) -> antagonism.Price:
+    """Return heat and gear friction as multiples of a serial leg's; see `dynamics.antagonism`.
 
-
-def serial_friction(leg: FiveBar, record: Mapping[str, Array], window: slice) -> float | None:
-    """Return the power through the gears as a multiple of a serial leg's."""
-    return _price(leg, record, window).friction
-
-
-def _price(leg: FiveBar, record: Mapping[str, Array], window: slice) -> antagonism.Price:
+    All None where there is no serial leg to compare with.
+    """
     pairs = [motors(record, name)[window] for name in ("theta", "theta_dot", "torque")]
     try:
         return antagonism.price(leg, *pairs)
     except FiveBarError:
-        # No serial leg to compare with: it does not reach, or the leg has left its branch.
+        # It does not reach, or the leg has left its branch.
         return antagonism.Price(None, None, None)
 
 

@@ -6,7 +6,7 @@ from contextlib import nullcontext
 
 import numpy as np
 
-from fivebar_sim.arrays import Array, Bools
+from fivebar_sim.arrays import Array, Bools, blocks
 from fivebar_sim.errors import DivergedError
 from fivebar_sim.metrics import energy
 from fivebar_sim.metrics.columns import Record
@@ -15,9 +15,6 @@ from fivebar_sim.simulation import record
 from fivebar_sim.simulation.measure import Unrecorded
 from fivebar_sim.simulation.plan import Plan
 from fivebar_sim.simulation.steps import States, fault
-
-ROWS = 4096
-"""Rows that are computed at once: few enough for the processor's cache, and for memory."""
 
 
 class Recorder:
@@ -44,9 +41,9 @@ class Recorder:
 
     def add(self, states: States) -> None:
         """Take the next states of this one simulation."""
-        for start in range(0, states.time.shape[1], ROWS):
+        for rows in blocks(states.time.shape[1]):
             if self.error is None:
-                self._add(states.part(slice(start, start + ROWS)))
+                self._add(states.part(rows))
 
         # The warnings are counted at the end of all these states.
         self._warnings = int(states.warnings[0])
