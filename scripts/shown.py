@@ -36,38 +36,50 @@ def items(page: str) -> Iterator[Item]:
     at = 0
     note = ("", "")
     while at < len(lines):
-        start = at
         line = lines[at]
-        if line.startswith("```"):
-            if "```" not in lines[at + 1 :]:
-                raise WrongError(f"line {start + 1}: a block without an end")
-            at = lines.index("```", at + 1)
+        if not line:
+            at += 1
+        elif line.startswith("<!--"):
+            note, at = _note(lines, at)
+        elif line.startswith("```"):
+            end = _closing(lines, at)
             language, _, rest = line[3:].partition(" ")
-            kind = language or "text"
             named = re.fullmatch(r'title="(.+)"', rest)
             title = named[1] if named else ""
-            body = lines[start + 1 : at]
-        elif line.startswith("<!--"):
-            while "-->" not in lines[at] and at + 1 < len(lines):
-                at += 1
-            found = NOTE.fullmatch("\n".join(lines[start : at + 1]))
-            if found is None:
-                raise WrongError(f"line {start + 1}: no such comment: {line}")
-            at = at + 1
-            note = (found[1], " ".join(found[2].split()))
-            continue
-        elif not line:
-            at += 1
-            continue
+            yield Item(language or "text", at + 1, "\n".join(lines[at + 1 : end]), title, *note)
+            at = end + 1
+            note = ("", "")
         else:
+            end = _last(lines, at)
             kind = "table" if line.startswith("|") else "paragraph"
-            title = ""
-            while at + 1 < len(lines) and lines[at + 1] and lines[at + 1][:3] not in ("```", "<!-"):
-                at += 1
-            body = lines[start : at + 1]
-        yield Item(kind, start + 1, "\n".join(body), title, *note)
-        at = at + 1
-        note = ("", "")
+            yield Item(kind, at + 1, "\n".join(lines[at : end + 1]), "", *note)
+            at = end + 1
+            note = ("", "")
+
+
+def _closing(lines: list[str], at: int) -> int:
+    """Return where the block that begins at a line ends."""
+    if "```" not in lines[at + 1 :]:
+        raise WrongError(f"line {at + 1}: a block without an end")
+    return lines.index("```", at + 1)
+
+
+def _note(lines: list[str], at: int) -> tuple[tuple[str, str], int]:
+    """Return the comment that begins at a line, and the line after it."""
+    end = at
+    while "-->" not in lines[end] and end + 1 < len(lines):
+        end += 1
+    found = NOTE.fullmatch("\n".join(lines[at : end + 1]))
+    if found is None:
+        raise WrongError(f"line {at + 1}: no such comment: {lines[at]}")
+    return (found[1], " ".join(found[2].split())), end + 1
+
+
+def _last(lines: list[str], at: int) -> int:
+    """Return the last line of the table or the paragraph that begins at a line."""
+    while at + 1 < len(lines) and lines[at + 1] and lines[at + 1][:3] not in ("```", "<!-"):
+        at += 1
+    return at
 
 
 def close(shown: str, came: str) -> bool:

@@ -39,3 +39,10 @@ def shell(
 def two_steps(monkeypatch: pytest.MonkeyPatch) -> None:
     """Have a system that cannot exchange two directories in one step."""
     monkeypatch.setattr(exchange, "exchange", lambda one, other: False)
+
+
+@pytest.fixture
+def light(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Write no recording but its first bytes: where the whole directory goes is what is asked."""
+    write = "fivebar_sim.recording.rrd.write"
+    monkeypatch.setattr(write, lambda path, runs: path.write_bytes(b"RRF2"))

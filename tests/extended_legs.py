@@ -87,8 +87,6 @@ def search(leg: FiveBar, p: Array, inside: Bools, elbows: tuple[int, ...]) -> Ar
     """
     z = ((p - kinematics.bases(leg)[0]) @ [1.0, 1j]) * np.exp(-1j * leg.tilt)
     offset = complex(*leg.foot_offset)
-    low = abs(leg.L4 - leg.L3)
-    high = leg.L4 + leg.L3
     kappa = np.linspace(0.0, math.pi, 1001)[None, :]
     width = math.pi / 1000
     gap = leg.L1 + abs(offset) - np.abs(z)
@@ -101,29 +99,44 @@ def search(leg: FiveBar, p: Array, inside: Bools, elbows: tuple[int, ...]) -> Ar
         for s in elbows:
             BF = abs(offset) * np.exp(-1j * s * kappa)
             C.append((leg.L1 + BF * leg.L2 / offset) * np.conj(leg.L1 + BF) / np.maximum(r, 1e-99))
-        ends = [np.angle(z)[:, None] + 0.0 * kappa]
-        with np.errstate(divide="ignore", invalid="ignore"):
-            for c in C:
-                for radius in (low, high):
-                    cosine = (abs(c) ** 2 + leg.L5**2 - radius**2) / (2.0 * abs(c) * leg.L5)
-                    ends += [s * np.arccos(cosine) - np.angle(c) + 0.0 * ends[0] for s in (1, -1)]
-        distances = []
-        for k, angle in enumerate(ends):
-            reach = [abs(c * np.exp(1j * angle) - leg.L5) for c in C]
-            covered = [(low <= x) & (x <= high) for x in reach]
-            if k:  # an end: its own elbow covers it but for rounding
-                covered[(k - 1) // 4] = np.isfinite(angle)
-                open_to = ~np.any(covered[: (k - 1) // 4] + covered[(k - 1) // 4 + 1 :], axis=0)
-                ok = np.isfinite(angle) & (open_to | ~inside[:, None])
-            else:
-                ok = np.any(covered, axis=0) != inside[:, None]
-            distances.append(np.where(ok, abs(z[:, None] - r * np.exp(1j * angle)), np.inf))
+        ends = _ends(leg, C, np.angle(z)[:, None] + 0.0 * kappa)
+        distances = [
+            np.where(
+                _counts(leg, C, angle, k, inside[:, None]),
+                abs(z[:, None] - r * np.exp(1j * angle)),
+                np.inf,
+            )
+            for k, angle in enumerate(ends)
+        ]
         d = np.min(distances, axis=0)
         best = np.minimum(best, d.min(axis=1))
         middle = np.broadcast_to(kappa, d.shape)[np.arange(len(p)), d.argmin(axis=1)]
         kappa = np.clip(middle[:, None] + width * np.linspace(-2.0, 2.0, 41), 0.0, math.pi)
         width /= 10.0
     return best
+
+
+def _ends(leg: FiveBar, C: list[Array], own: Array) -> list[Array]:
+    """Return the directions in which arcs end, four for each elbow, after the points' own."""
+    ends = [own]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        for c in C:
+            for radius in (abs(leg.L4 - leg.L3), leg.L4 + leg.L3):
+                cosine = (abs(c) ** 2 + leg.L5**2 - radius**2) / (2.0 * abs(c) * leg.L5)
+                ends += [s * np.arccos(cosine) - np.angle(c) + 0.0 * own for s in (1, -1)]
+    return ends
+
+
+def _counts(leg: FiveBar, C: list[Array], angle: Array, k: int, inside: Bools) -> Bools:
+    """Return where direction k of `_ends` is on the other side of the boundary."""
+    reach = [abs(c * np.exp(1j * angle) - leg.L5) for c in C]
+    covered = [(abs(leg.L4 - leg.L3) <= x) & (x <= leg.L4 + leg.L3) for x in reach]
+    if k == 0:
+        return np.any(covered, axis=0) != inside
+    # An end: its own elbow covers it but for rounding.
+    own = (k - 1) // 4
+    open_to = ~np.any(covered[:own] + covered[own + 1 :], axis=0)
+    return np.isfinite(angle) & (open_to | ~inside)
 
 
 def around(leg: FiveBar, rng: np.random.Generator, count: int) -> Array:

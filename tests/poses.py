@@ -19,6 +19,14 @@ LINE = FiveBar(0.25, 0.5, 0.5, 0.25, 0.5)
 RIGHT = FiveBar(0.03, 0.04, 0.04, 0.03, 0.06)  # has poses of 3-4-5 triangles
 BATCHES = [(), (1,), (3, 1, 4)]
 
+FAR = np.full((2, 3, 2), [0.0, -0.04])
+"""Feet [m], two of which no leg above reaches."""
+FAR[1, 0] = (0.0, -0.5)
+FAR[1, 2] = (np.nan, 0.0)
+
+WIDE = ((-20.0, 20.0), (-20.0, 20.0))
+"""Joint limits that every pose is within [rad]."""
+
 
 def random_leg(rng: np.random.Generator) -> FiveBar:
     """Return a leg of unequal links that can close; a third is coaxial, a third has no L6."""

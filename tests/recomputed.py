@@ -202,8 +202,35 @@ def _heat(run: Run) -> Found:
 def _beside_serial(run: Run) -> Found:
     """Return heat and gear work as multiples of those of a serial leg in the same places."""
     leg = run.scenario["leg"]
-    A, E = (run.record[f"theta_{m}"][run.rows] for m in "AE")
     tau, omega = (run.pair(name)[run.rows] for name in ("torque", "theta_dot"))
+    foot, (a, e) = _foot_and_columns(run)
+    force = 1j * (tau[:, 1] * a - tau[:, 0] * e) / (np.conj(a) * e).imag
+    moved = a * omega[:, 0] + e * omega[:, 1]
+
+    L1 = leg["L1"]
+    tibia = abs(leg["L2"] + leg["L6"] * np.exp(1j * leg["bend"]))
+    far = np.abs(foot)
+    if far.max() > L1 + tibia or far.min() < abs(L1 - tibia):
+        return {"load.serial_heat": None, "load.serial_friction": None}
+    bent = np.arccos((L1**2 + far**2 - tibia**2) / (2.0 * L1 * far))
+    knee = L1 * foot / far * np.exp(1j * leg["mode"][0] * bent)
+    hip_arm = 1j * foot
+    knee_arm = 1j * (foot - knee)
+    torques = [(np.conj(arm) * force).real for arm in (hip_arm, knee_arm)]
+    area = (np.conj(hip_arm) * knee_arm).imag
+    rates = [(np.conj(moved) * knee_arm).imag / area, (np.conj(hip_arm) * moved).imag / area]
+    heat = sum(t @ t for t in torques)
+    passed = sum(np.abs(t * w).sum() for t, w in zip(torques, rates, strict=True))
+    return {
+        "load.serial_heat": (tau**2).sum() / heat,
+        "load.serial_friction": np.abs(tau * omega).sum() / passed,
+    }
+
+
+def _foot_and_columns(run: Run) -> tuple[Any, list[Any]]:
+    """Return the foot x + 1j z, and how it moves with A and with E."""
+    leg = run.scenario["leg"]
+    A, E = (run.record[f"theta_{m}"][run.rows] for m in "AE")
     out = leg["L6"] / leg["L2"] * np.exp(1j * leg["bend"])
     half = 0.5 * leg["L5"] * np.exp(1j * leg["tilt"])
     AB = leg["L1"] * np.exp(1j * A)
@@ -223,28 +250,7 @@ def _beside_serial(run: Run) -> Found:
         area = (np.conj(BC) * DC).imag
         c = 1j * (q * BC - p * DC) / area
         columns.append(c + out * (c - b))
-    a, e = columns
-    force = 1j * (tau[:, 1] * a - tau[:, 0] * e) / (np.conj(a) * e).imag
-    moved = a * omega[:, 0] + e * omega[:, 1]
-
-    L1 = leg["L1"]
-    tibia = abs(leg["L2"] * (1.0 + out))
-    far = np.abs(foot)
-    if far.max() > L1 + tibia or far.min() < abs(L1 - tibia):
-        return {"load.serial_heat": None, "load.serial_friction": None}
-    bent = np.arccos((L1**2 + far**2 - tibia**2) / (2.0 * L1 * far))
-    knee = L1 * foot / far * np.exp(1j * leg["mode"][0] * bent)
-    hip_arm = 1j * foot
-    knee_arm = 1j * (foot - knee)
-    torques = [(np.conj(arm) * force).real for arm in (hip_arm, knee_arm)]
-    area = (np.conj(hip_arm) * knee_arm).imag
-    rates = [(np.conj(moved) * knee_arm).imag / area, (np.conj(hip_arm) * moved).imag / area]
-    heat = sum(t @ t for t in torques)
-    passed = sum(np.abs(t * w).sum() for t, w in zip(torques, rates, strict=True))
-    return {
-        "load.serial_heat": (tau**2).sum() / heat,
-        "load.serial_friction": np.abs(tau * omega).sum() / passed,
-    }
+    return foot, columns
 
 
 def _lasting(run: Run) -> slice:

@@ -174,6 +174,15 @@ def test_foot_force_of_time_pose_and_rates_is_its_torques_at_the_motors() -> Non
         assert np.abs(pushed - move().theta).max() > 1e-3
 
 
+def loop_gap(mj: mujoco.MjModel, data: mujoco.MjData) -> tuple[Array, Array]:
+    """Return MuJoCo's gap of the loop (x, z) [m], and its Jacobian, (2, 4)."""
+    sites = [mj.site(name).id for name in ("C_left", "C_right")]
+    J = np.zeros((2, 3, 4))
+    for site, into in zip(sites, J, strict=True):
+        mujoco.mj_jacSite(mj, data, into, None, site)
+    return (data.site_xpos[sites[0]] - data.site_xpos[sites[1]])[::2], (J[0] - J[1])[::2]
+
+
 @pytest.mark.parametrize("damping", [0.0, 0.05])
 @pytest.mark.parametrize("leg", [CLASSIC, replace(HEAVY, tilt=0.2)], ids=["classic", "heavy"])
 def test_gap_of_a_soft_loop_obeys_its_equation(leg: FiveBar, damping: float) -> None:
@@ -185,7 +194,6 @@ def test_gap_of_a_soft_loop_obeys_its_equation(leg: FiveBar, damping: float) -> 
     data = mujoco.MjData(mj)
     M = np.zeros((4, 4))
     D = np.diag([damping, 0.0, damping, 0.0])
-    sites = [mj.site(name).id for name in ("C_left", "C_right")]
     left = []
     parts = []
     for row in range(len(q) - 1):
@@ -195,11 +203,7 @@ def test_gap_of_a_soft_loop_obeys_its_equation(leg: FiveBar, damping: float) -> 
         data.qvel[:] = v
         mujoco.mj_forward(mj, data)
         mujoco.mj_fullM(mj, data, M)
-        J = np.zeros((2, 3, 4))
-        for site, into in zip(sites, J, strict=True):
-            mujoco.mj_jacSite(mj, data, into, None, site)
-        slope = (J[0] - J[1])[::2]
-        gap = (data.site_xpos[sites[0]] - data.site_xpos[sites[1]])[::2]
+        gap, slope = loop_gap(mj, data)
         psi, w = ([x[0], x[0] + x[1], x[2], x[2] + x[3]] for x in (q[row], v))
         reach = np.array([-leg.L1, -leg.L2, leg.L4, leg.L3]) * np.square(w)
         spun = reach @ np.stack([np.cos(psi), np.sin(psi)], axis=-1)
