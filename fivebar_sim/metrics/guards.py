@@ -19,15 +19,13 @@ import numpy as np
 from fivebar_sim import units
 from fivebar_sim.arrays import Array, Bools
 from fivebar_sim.checks import check_number
-from fivebar_sim.dynamics import creep
-from fivebar_sim.dynamics.creep import Footing
 from fivebar_sim.dynamics.heat import Heating
-from fivebar_sim.errors import PoseError, unknown
+from fivebar_sim.errors import unknown
 from fivebar_sim.geometry import FiveBar
 from fivebar_sim.kinematics.stops import Ranges, beyond
 from fivebar_sim.metrics import ground
 from fivebar_sim.metrics.branch import Branch
-from fivebar_sim.metrics.columns import GROUND_COLUMNS, JOINT_COLUMNS, motors, side_by_side
+from fivebar_sim.metrics.columns import JOINT_COLUMNS, motors, side_by_side
 from fivebar_sim.metrics.energy import Balance
 from fivebar_sim.metrics.json_types import LARGEST, Amount, Number, Table
 from fivebar_sim.metrics.lasting import chattering, clipped
@@ -143,8 +141,8 @@ class Evidence(NamedTuple):
         command: Steps from one command of the motors to the next.
         ranges: The ranges of the joints, see `stops.beyond`.
         trunk: Height of the trunk's lowest point above the hip frame's origin [m].
-        footing: What holds a foot that creeps in its place; None under `discrete`, and on a floor
-            without friction.
+        crept: What a creeping foot changes in each motor's torque, see `creep.changes`, (N, 2);
+            None under `discrete`, and on a floor without friction.
         heating: Heat of the motors if the motion goes on for good; None where the servo's table
             does not describe the winding.
         growth: Decades by which errors of the feedback would have grown by each step if commands
@@ -163,7 +161,7 @@ class Evidence(NamedTuple):
     command: int
     ranges: Ranges
     trunk: float
-    footing: Footing | None = None
+    crept: Array | None = None
     heating: Heating | None = None
     growth: Array | None = None
     jolts: Array | None = None
@@ -304,25 +302,13 @@ def _carrying_rail(run: Evidence) -> Found | None:
 
 
 def _creeping(run: Evidence) -> Found | None:
-    if run.footing is None:
+    if run.crept is None:
         return None
     high = run.bounds.contact
-    record = run.record
-    course = creep.Course(
-        timestep=float(record["time"][0]),
-        q=side_by_side(record, JOINT_COLUMNS),
-        rate_A=record["theta_dot_A"],
-        ground=side_by_side(record, GROUND_COLUMNS),
-        torque=motors(record, "torque"),
-    )
-    try:
-        parts = creep.changes(run.leg, run.footing, course)
-    except PoseError:
-        return Found(None, high, None)
-    value = float(np.sqrt((parts**2).mean(axis=0)).max())
+    value = float(np.sqrt((run.crept**2).mean(axis=0)).max())
     # Where the RMS is above the bound, some step is, too.
-    above = np.abs(parts).max(axis=1) > high
-    return Found(value, high, _first(above, record["time"]) if value > high else None)
+    above = np.abs(run.crept).max(axis=1) > high
+    return Found(value, high, _first(above, run.record["time"]) if value > high else None)
 
 
 def _highest(run: Evidence, values: Array, high: float) -> Found:

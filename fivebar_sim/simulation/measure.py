@@ -10,8 +10,8 @@ import numpy as np
 
 from fivebar_sim.arrays import Array, Bools
 from fivebar_sim.control import Feedback
-from fivebar_sim.dynamics import heat
-from fivebar_sim.dynamics.creep import Footing
+from fivebar_sim.dynamics import creep, heat
+from fivebar_sim.errors import PoseError
 from fivebar_sim.kinematics.stops import Ranges
 from fivebar_sim.metrics import (
     branch,
@@ -23,7 +23,13 @@ from fivebar_sim.metrics import (
     measured,
     peaks,
 )
-from fivebar_sim.metrics.columns import by_motor, motors
+from fivebar_sim.metrics.columns import (
+    GROUND_COLUMNS,
+    JOINT_COLUMNS,
+    by_motor,
+    motors,
+    side_by_side,
+)
 from fivebar_sim.metrics.json_types import Motors, Parts
 from fivebar_sim.metrics.measured import Measured
 from fivebar_sim.metrics.sharing import Load, Temperatures
@@ -93,7 +99,7 @@ def measure(scenario: Scenario, record: Mapping[str, Array], besides: Unrecorded
         command=scenario.command,
         ranges=besides.ranges,
         trunk=besides.trunk,
-        footing=_footing(scenario),
+        crept=_crept(scenario, record),
         heating=heated,
         growth=besides.growth,
         jolts=besides.jolts,
@@ -116,7 +122,26 @@ def measure(scenario: Scenario, record: Mapping[str, Array], besides: Unrecorded
     )
 
 
-def _footing(scenario: Scenario) -> Footing | None:
+def _crept(scenario: Scenario, record: Mapping[str, Array]) -> Array | None:
+    """Return what a creeping foot changes in the torques, (N, 2); None where it does not creep."""
+    footing = _footing(scenario)
+    if footing is None:
+        return None
+    course = creep.Course(
+        timestep=scenario.sim.timestep,
+        q=side_by_side(record, JOINT_COLUMNS),
+        rate_A=record["theta_dot_A"],
+        ground=side_by_side(record, GROUND_COLUMNS),
+        torque=motors(record, "torque"),
+    )
+    try:
+        return creep.changes(scenario.leg, footing, course)
+    except PoseError:
+        # A leg that has come to lie in line has lost its branch, which has a guard of its own.
+        return None
+
+
+def _footing(scenario: Scenario) -> creep.Footing | None:
     """Return what holds the foot in its place; None where it does not creep."""
     scene = scenario.scene
     if not isinstance(scene, Ground) or scene.friction == 0.0:
@@ -129,7 +154,7 @@ def _footing(scenario: Scenario) -> Footing | None:
     servo = scenario.servo
     damping = servo.damping if drive == "position" else servo.back_emf
     # The stiffness of a feedback controller is its own; it is taken to be the servo's.
-    return Footing(scene.friction, damping, servo.kp)
+    return creep.Footing(scene.friction, damping, servo.kp)
 
 
 def _heating(scenario: Scenario, record: Mapping[str, Array]) -> heat.Heating | None:
