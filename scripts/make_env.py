@@ -19,6 +19,7 @@ Needs the standard library alone: it runs before anything is installed.
 from __future__ import annotations
 
 import argparse
+import fcntl
 import hashlib
 import json
 import os
@@ -228,6 +229,21 @@ def set_up(root: Path, kind: str, pip: str | None = None) -> None:
             env.pip("check", "--disable-pip-version-check")
 
 
+@contextmanager
+def alone(root: Path) -> Iterator[None]:
+    """Wait until no other set-up works on the same folder; then keep others waiting."""
+    folder = os.open(root, os.O_RDONLY)
+    try:
+        try:
+            fcntl.flock(folder, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            print("Waiting for another set-up of this folder ...", flush=True)
+            fcntl.flock(folder, fcntl.LOCK_EX)
+        yield
+    finally:
+        os.close(folder)
+
+
 def say_what_is_left_out() -> None:
     """Print which extra this Python cannot have."""
     if sys.version_info >= (3, 13):
@@ -266,7 +282,8 @@ def main() -> int:
         if args.dry_run:
             print("\n".join(would_install(root, args.kind, args.pip)))
         else:
-            set_up(root, args.kind, args.pip)
+            with alone(root):
+                set_up(root, args.kind, args.pip)
     except (SetUpError, OSError) as error:
         print(f"fivebar-sim could not be set up: {error}", file=sys.stderr)
         return 1

@@ -228,6 +228,27 @@ def test_pip_resolves_and_builds_nothing(root: Path, pip: Pip) -> None:
     assert sum("--no-index" in words for words in installs) == 1  # the project itself
 
 
+def test_second_set_up_waits_for_the_first(tmp_path: Path) -> None:
+    """Else each deletes what the other installs."""
+    code = """if True:
+        import pathlib, sys
+        sys.path.insert(0, sys.argv[1])
+        import make_env
+        root = pathlib.Path(sys.argv[2])
+        with make_env.alone(root):
+            print("whole" if (root / "whole").exists() else "half made")"""
+    command = [sys.executable, "-c", code, str(ROOT / "scripts"), str(tmp_path)]
+    with make_env.alone(tmp_path):
+        other = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+        assert other.stdout
+        assert other.stdout.readline() == "Waiting for another set-up of this folder ...\n"
+        time.sleep(0.3)  # long enough for one that does not wait
+        (tmp_path / "whole").touch()
+    rest, _ = other.communicate()
+    assert rest == "whole\n"
+    assert other.returncode == 0
+
+
 # what the user is told
 
 
