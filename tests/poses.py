@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import cache
 
 import numpy as np
 
@@ -59,6 +60,15 @@ def sample(
     leg: FiveBar, batch: tuple[int, ...], mode: Mode = (-1, 1), assembly: int = -1
 ) -> tuple[Array, Array]:
     """Return feet and angles of a branch where all three passive angles' sines are above 0.4."""
+    foot, theta = _sampled(leg, mode, assembly)
+    rows = slice(math.prod(batch))
+    shape = (*batch, 2)
+    return foot[rows].reshape(shape).copy(), theta[rows].reshape(shape).copy()
+
+
+@cache
+def _sampled(leg: FiveBar, mode: Mode, assembly: int) -> tuple[Array, Array]:
+    """Return all that `sample` takes its first rows of."""
     foot = np.random.default_rng(1).uniform(-1.0, 1.0, (20_000, 2)) * leg.size
     theta = kinematics.inverse_all(leg, foot)[:, MODES.index(mode)]
     ok = np.isfinite(theta[:, 0])
@@ -70,6 +80,4 @@ def sample(
     DC = p.C_right - p.D
     sines = np.min([sine(BC, DC), sine(p.B - A, foot - p.B), sine(p.D - E, DC)], axis=0)
     good = (sines > 0.4) & (kinematics.branch(leg, p).assembly == assembly)
-    rows = np.flatnonzero(good)[: math.prod(batch)]
-    shape = (*batch, 2)
-    return foot[rows].reshape(shape), theta[rows].reshape(shape)
+    return foot[good], theta[good]
