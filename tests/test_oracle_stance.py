@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import oracle
@@ -29,6 +30,7 @@ SERVO = Servo(8.0, 0.05, "velocity")
 TIMES: Array = np.linspace(0.001, 0.4, 400)
 
 
+@cache
 def squat(name: str, *, grips: bool, servo: Servo = SERVO, still: bool = False) -> Stance:
     leg = SQUATS[name][0]
     path = path_of(name, still=still)

@@ -152,7 +152,7 @@ def truth(preset: str, feedforward: str) -> Truth:
     """Return the oracle's motion of a preset."""
     leg = FiveBar.load(preset)
     last = round((RAMP + PERIOD) / TICK)
-    rows = np.arange(GRID, last + 1, GRID)
+    rows = np.arange(GRID, last + 1, GRID)[ROWS]
     early = {h: rows - round(h / TICK) for h in TIMESTEPS}
     ticks = np.unique(np.concatenate([rows, *early.values()]))
     motion = oracle_simulation.simulate(
@@ -162,9 +162,9 @@ def truth(preset: str, feedforward: str) -> Truth:
         RAMP + PERIOD,
         ticks.astype(np.float64) * TICK,
     )
-    at = {h: motion.tau[np.searchsorted(ticks, wanted)][ROWS] for h, wanted in early.items()}
+    at = {h: motion.tau[np.searchsorted(ticks, wanted)] for h, wanted in early.items()}
     every = np.searchsorted(ticks, rows)
-    return Truth(motion.foot[every][ROWS], motion.tau[every][ROWS], at)
+    return Truth(motion.foot[every], motion.tau[every], at)
 
 
 def measure(keys: Sequence[Key], nthread: int = 2) -> dict[Key, Error]:
