@@ -17,7 +17,7 @@ import pytest
 from shell import ELLIPSE, Shell, started
 
 from fivebar_sim import rollout
-from fivebar_sim.runs import recording_file
+from fivebar_sim.recording.check import read_through
 from fivebar_sim.scenario import Scenario
 
 PROGRAM = "import sys; from fivebar_sim.cli import main; sys.exit(main())"
@@ -73,7 +73,7 @@ def test_replay_starts_the_viewer_on_loopback(
     def pretend(command: list[str], env: dict[str, str]) -> subprocess.CompletedProcess[bytes]:
         started.append(command)
         assert env["CI"] == "true"
-        assert recording_file.is_readable(Path(command[-1]))
+        read_through(Path(command[-1]))
         return subprocess.CompletedProcess(command, 0)
 
     monkeypatch.setenv("DISPLAY", ":0")
@@ -123,7 +123,7 @@ def test_web_serves_until_it_is_ended_and_leaves_nothing(
         connection = http.client.HTTPConnection("127.0.0.1", int(found[1]), timeout=10)
         connection.request("GET", "/recording.rrd")
         (tmp_path / "served.rrd").write_bytes(connection.getresponse().read())
-        assert recording_file.is_readable(tmp_path / "served.rrd")
+        read_through(tmp_path / "served.rrd")
         server.send_signal(number)
         out, err = server.communicate(timeout=30)
         assert (server.returncode, out, err) == (status, "", "")

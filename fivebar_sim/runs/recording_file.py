@@ -96,13 +96,18 @@ def is_readable(path: Path, run: str | None = None) -> bool:
         path: The recording.
         run: What identifies the run whose recording it must be, see `identity`; None for any.
     """
-    return path.is_file() and not is_newer(path) and check.reads(path, run)
+    return path.is_file() and may_be_read(path) and check.reads(path, run)
 
 
-def is_newer(path: Path) -> bool:
-    """Return whether a recording was written by a newer Rerun than the installed one."""
+def may_be_read(path: Path) -> bool:
+    """Return whether a header is that of a recording of the installed Rerun or an older one.
+
+    Starting another process to read anything else takes most of a second.
+    """
     with path.open("rb") as file:
         head = file.read(8)
     # The header is b"RRF2", then major, minor and patch as one byte each, and one of pre-releases.
+    if head[:4] != b"RRF2":
+        return False
     here = [int(part) for part in re.findall(r"\d+", version("rerun-sdk"))[:3]]
-    return list(head[4:7]) > here
+    return list(head[4:7]) <= here
