@@ -17,6 +17,7 @@ from fivebar_sim.geometry import FiveBar
 from fivebar_sim.kinematics.stops import angle_at_C
 from fivebar_sim.metrics import guards, lasting
 from fivebar_sim.metrics.guards import Guard, Guards
+from fivebar_sim.report import single
 from fivebar_sim.rollout import Plan, Result
 from fivebar_sim.scenario import Scenario
 
@@ -338,7 +339,8 @@ def test_scenario_sets_and_keeps_them(tmp_path: Path) -> None:
         Guards(torque=2)
 
 
-def test_everyone_is_told(shell: Shell) -> None:
+def test_everyone_is_told(shell: Shell, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(single, "figures", lambda run: [])  # what is said is enough
     chatter = [f"--set={setting}" for setting in ("limits={}", *CHATTER)]
     words = "guard torque: a motor's torque had been clipped for more than 50 % of a second at"
     said = shell("run", "airhockey-pd", *chatter, "--out", "run")
@@ -363,6 +365,7 @@ def test_new_guard_is_a_rule_and_a_function(shell: Shell, monkeypatch: pytest.Mo
     rule = guards.Rule("depth", too_deep, "foot below {}", ", {} at worst", 1e3, "mm")
     monkeypatch.setattr(guards, "GUARDS", (*guards.GUARDS, rule))
     monkeypatch.setitem(guards.RULES, rule.name, rule)
+    monkeypatch.setattr(single, "figures", lambda run: [])
 
     words = "guard depth: foot below 10 mm at t = 0.004 s, "
     said = shell("run", "short.toml", "--out", "run")

@@ -60,10 +60,7 @@ def runs(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
 @pytest.fixture(scope="module")
 def pages(runs: dict[str, Path]) -> dict[str, Page]:
     """Return the pages of all runs, and that of them together as "all"."""
-    pictures = {"trot": runs["trot"].parent / "pictures"}
-    places = {
-        name: report.write([path], None, pictures.get(name))[-1] for name, path in runs.items()
-    }
+    places = {name: report.write([path])[-1] for name, path in runs.items()}
     together = report.write(list(runs.values()), runs["trot"].parent / "all.html")[-1]
     return {name: Page(place) for name, place in {**places, "all": together}.items()}
 
@@ -214,20 +211,37 @@ def test_comparison_tells_runs_apart(runs: dict[str, Path], pages: dict[str, Pag
     assert "sim.timestep" not in differing
 
 
+OWN_STYLE = {"svg.hashsalt": None, "xtick.major.size": 20.0, "font.size": 20}
+"""What a user's matplotlibrc may say."""
+
+
 def test_same_runs_same_bytes(
     runs: dict[str, Path], pages: dict[str, Page], tmp_path: Path
 ) -> None:
     import matplotlib
 
-    with matplotlib.rc_context({"svg.hashsalt": None, "xtick.major.size": 20.0, "font.size": 20}):
-        *pictures, page = report.write([runs["trot"]], tmp_path / "again.html", tmp_path / "png")
+    with matplotlib.rc_context(OWN_STYLE):
+        (page,) = report.write([runs["trot"]], tmp_path / "again.html")
     assert page.read_text(encoding="utf-8") == pages["trot"].source
-    assert [path.name for path in pictures] == [f"{key}.png" for key in GROUNDED]
-    for picture in pictures:
-        assert picture.read_bytes().startswith(b"\x89PNG")
-        assert (
-            picture.read_bytes() == (runs["trot"].parent / "pictures" / picture.name).read_bytes()
-        )
+
+
+def test_same_runs_same_pictures(
+    runs: dict[str, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of one figure in the plane and one over time: the others are drawn like these."""
+    import matplotlib
+
+    every = single.figures
+    monkeypatch.setattr(single, "figures", lambda run: every(run)[:3:2])
+    monkeypatch.setattr(look, "svg", lambda figure, key, alt: "<svg></svg>")
+    kept = []
+    for style in ({}, OWN_STYLE):
+        with matplotlib.rc_context(style):
+            *pictures, _ = report.write([runs["trot"]], tmp_path / "a.html", tmp_path / "png")
+        assert [path.name for path in pictures] == ["foot-path.png", "tracking-error.png"]
+        kept.append([picture.read_bytes() for picture in pictures])
+    assert kept[0] == kept[1]
+    assert all(picture.startswith(b"\x89PNG") for picture in kept[0])
 
 
 @pytest.mark.usefixtures("pages")
