@@ -86,7 +86,7 @@ def test_other_assembly_is_another_aspect() -> None:
 @pytest.mark.parametrize("mode", MODES)
 def test_parts_are_those_of_the_foot_plane(leg: FiveBar, mode: Mode) -> None:
     """Components of a fine grid of feet, a chart that the atlas has not; slivers left out."""
-    line = np.linspace(-1.2, 1.2, 501) * leg.size
+    line = np.linspace(-1.2, 1.2, 301) * leg.size
     foot = np.stack(np.meshgrid(line, line, indexing="ij"), axis=-1)
     found = assemblies(leg, foot, mode)
     seen = []
@@ -95,9 +95,9 @@ def test_parts_are_those_of_the_foot_plane(leg: FiveBar, mode: Mode) -> None:
         count = int(ndimage.label(found == assembly, output=label))  # pyright: ignore[reportArgumentType]
         for k in range(1, count + 1):
             nodes = foot[label == k]
-            if len(nodes) < 60:
+            if len(nodes) < 22:
                 continue
-            here = aspect_at(leg, nodes[:: len(nodes) // 40], mode=mode)
+            here = aspect_at(leg, nodes[:: len(nodes) // 20], mode=mode)
             (part,) = set(here.part.tolist()) - {0}
             seen.append((assembly, part))
     assert len(set(seen)) == len(seen)

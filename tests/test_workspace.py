@@ -111,7 +111,7 @@ def length(v: Array) -> Array:
 # law
 
 
-@pytest.mark.parametrize("count", [50, pytest.param(334, marks=pytest.mark.long)])
+@pytest.mark.parametrize("count", [20, pytest.param(334, marks=pytest.mark.long)])
 @pytest.mark.parametrize("draw", TOPOLOGIES)
 def test_nearest_and_distance_against_search(draw: Draw, count: int) -> None:
     rng = np.random.default_rng(5)

@@ -67,7 +67,7 @@ def test_singular_curves_are_where_the_loop_flips(L6: float, mode: Mode) -> None
         loop = singularity.distances_at(leg, curves[sound], mode=mode).loop
         # the motors of a foot near the edge are off by the square root of rounding
         assert np.abs(loop).max() < 1e-6 * leg.size
-        line = np.linspace(-1.1, 1.1, 241) * leg.size
+        line = np.linspace(-1.1, 1.1, 161) * leg.size
         grid = np.stack(np.meshgrid(line, line), axis=-1)
         inside = workspace.reachable(leg, grid, mode=mode)
         loop = np.full(inside.shape, np.nan)
