@@ -44,7 +44,7 @@ def sampled(
     T = controller.period
     q = theta
     w = np.broadcast_to(rate, theta.shape)
-    n = math.ceil(T / 0.002)
+    n = math.ceil(T / 0.005)
     rows = [(0.0, q, w)]
     for k in range(round(time / T)):
         tau = controller.command(leg, Servo(), Observation(k * T, q, w), wanted(k * T))
@@ -216,7 +216,7 @@ def test_mass_error_leaves_a_bounded_error() -> None:
     """At rest -mass_error M^-1 weight / ((1 + mass_error) kp); in motion more, yet stable."""
     theta = kinematics.inverse(CLASSIC, (0.005, -0.075))
     law = ComputedTorque(mass_error=0.2)
-    motion = sampled(CLASSIC, law, keep(CLASSIC, theta), theta, 0.6)  # slowest: 35 / s
+    motion = sampled(CLASSIC, law, keep(CLASSIC, theta), theta, 0.5)  # slowest: 35 / s
     end = motion.theta[-1]
     pull = np.linalg.solve(dynamics.mass_matrix(CLASSIC, end), dynamics.bias(CLASSIC, end, STILL))
     np.testing.assert_allclose(theta - end, -0.2 * pull / (1.2 * law.kp), rtol=1e-6)
@@ -225,7 +225,7 @@ def test_mass_error_leaves_a_bounded_error() -> None:
     ideal, heavy, light = (
         misses(
             CLASSIC,
-            sampled(CLASSIC, ComputedTorque(mass_error=e), path, path(0.0).theta, 0.75),
+            sampled(CLASSIC, ComputedTorque(mass_error=e), path, path(0.0).theta, 0.5),
             path,
         )
         for e in (0.0, 0.2, -0.2)

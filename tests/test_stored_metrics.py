@@ -41,10 +41,12 @@ def _saved(folder: Path, content: Any) -> Path:
 
 
 def _holders(value: Any) -> list[tuple[Any, Any]]:
-    """Return (table or list, key) of everything at any depth."""
+    """Return (table or list, key) of everything at any depth; of lists the first and the last."""
     if not isinstance(value, (dict, list)):
         return []
     pairs = list(value.items()) if isinstance(value, dict) else list(enumerate(value))
+    if isinstance(value, list):
+        pairs = [*pairs[:1], *pairs[1:][-1:]]
     return [found for key, inner in pairs for found in [(value, key), *_holders(inner)]]
 
 

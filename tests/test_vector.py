@@ -51,7 +51,7 @@ def test_each_leg_has_the_bits_of_it_alone(kind: str, randomise: Randomise | Non
     random = np.random.default_rng(0)
     over = [False] * LEGS
     ends = 0
-    for _ in range(100):
+    for _ in range(60):
         chosen = random.uniform(legs.episodes.low, legs.episodes.high, legs.action_space.shape)
         seen, reward, terminated, truncated, info = legs.step(chosen)
         for i, env in enumerate(alone):
