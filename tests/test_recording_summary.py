@@ -54,7 +54,7 @@ def test_several_runs_stand_side_by_side() -> None:
     assert "## calm: PASS" in lines
     assert "| metric | a \\| b | calm |" in lines
     assert "| loop gap RMS (run) | 0.1 um | 2 um |" in lines
-    assert "| slip in stance |  | 1 mm |" in lines
+    assert "| slip, all stances |  | 1 mm |" in lines
     assert lines[-1] == "**Colours**: a \\| b blue, calm orange."
 
 
@@ -67,4 +67,4 @@ def test_it_is_in_the_recording(tmp_path: Path) -> None:
 
 def test_limit_on_what_was_not_measured_is_broken() -> None:
     text = summary(["air"], [MEASURED], [{"ground.slip": (0.0, 1.0)}])
-    assert "| slip in stance | 0 to 1 m | undefined | **FAIL** |" in text
+    assert "| slip, all stances | 0 to 1 m | undefined | **FAIL** |" in text

@@ -95,7 +95,7 @@ def test_what_is_undefined_on_one_side_fails() -> None:
     assert verdict("load.share_A", 0.5, None) == "FAIL"
     assert verdict("load.share_A", None, 0.5) == "FAIL"
     gone = comparison.compare(result({}), recorded({"ground.slip": 1e-3}))  # it was a rail, once
-    assert gone.failures == ["slip in stance: undefined, baseline 1 mm"]
+    assert gone.failures == ["slip, all stances: undefined, baseline 1 mm"]
 
 
 def test_limits_count_beside_baselines() -> None:

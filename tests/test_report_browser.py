@@ -76,14 +76,16 @@ def browser() -> Iterator[Browser]:
 
 @pytest.fixture(scope="module")
 def reports(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
-    """Return the page of a run, and that of two, one with a name that is too long for a line."""
+    """Return the pages of one run, of two and of five, one name of which is too long for a line."""
     folder = tmp_path_factory.mktemp("runs")
     runs = [folder / "trot", folder / ("a" * 60 + " " + "b" * 90)]
     for place, name in zip(runs, ("treadmill-trot", "classic-ellipse"), strict=True):
         rollout.run(Scenario.load(name, ["duration=0.8"])).write(place)
+    more = [Path(shutil.copytree(runs[0], folder / name)) for name in ("trot-2", "trot-3", "hop")]
     return {
         "one": report.write(runs[:1])[-1],
         "two": report.write(runs, folder / "two.html")[-1],
+        "five": report.write([*runs, *more], folder / "five.html")[-1],
     }
 
 
@@ -99,7 +101,7 @@ def opened(browser: Browser, path: Path) -> tuple[Page, list[str]]:
     return page, said
 
 
-@pytest.mark.parametrize("which", ["one", "two"])
+@pytest.mark.parametrize("which", ["one", "two", "five"])
 def test_page_is_alone_drawn_and_fits(
     browser: Browser, reports: dict[str, Path], which: str
 ) -> None:

@@ -243,7 +243,7 @@ CATALOGUE = (
     ),
     *_ground_forces(),
     Metric("ground.stance_share", "time in stance", 1e2, "%", tolerance=2e-3),
-    Metric("ground.slip", "slip in stance", 1e3, "mm", tolerance=1e-6, less_is_better=True),
+    Metric("ground.slip", "slip, all stances", 1e3, "mm", tolerance=1e-6, less_is_better=True),
     Metric("ground.foot_height_max", "foot height max", 1e3, "mm", tolerance=1e-6, window=RUN),
     Metric("ground.flight_max", "longest flight", 1e3, "ms", tolerance=2e-3, window=RUN),
     Metric(

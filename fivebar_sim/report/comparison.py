@@ -31,6 +31,9 @@ STYLES = ("-", "--", ":", "-.")
 NAME = 0.19
 """Height of one line of the legend above a figure [in]."""
 
+MOST_STACKED = 5
+"""Most runs whose values a phone shows side by side; tables of more scroll."""
+
 MOST = COLOURS * len(STYLES)
 """Most runs that colours and line styles can distinguish."""
 
@@ -257,7 +260,8 @@ def _metrics(runs: Sequence[StoredRun]) -> str:
             row.append(Cell(cell))
         rows.append(row)
 
-    return html.table("Below each value: its difference to the first run.", head, rows)
+    what = "Below each value: its difference to the first run."
+    return html.table(what, head, rows, stacked=len(runs) <= MOST_STACKED)
 
 
 def difference(key: str, run: StoredRun, first: StoredRun) -> str:
@@ -290,4 +294,6 @@ def _differences(runs: Sequence[StoredRun]) -> str:
     ]
     if not rows:
         return "<p>Nothing: the scenarios are the same.</p>"
-    return html.table("Keys of scenario.toml, in SI units.", ("key", *names(runs)), rows)
+    stacked = len(runs) <= MOST_STACKED
+    what = "Keys of scenario.toml, in SI units."
+    return html.table(what, ("key", *names(runs)), rows, stacked=stacked)

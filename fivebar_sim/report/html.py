@@ -55,6 +55,13 @@ tbody th { min-width: 6.5rem; }
 @media (max-width: 40rem) {
   table { font-size: .8rem; }
   th, td { padding-right: .4rem; }
+  .stacked, .stacked thead, .stacked tbody { display: block; }
+  .stacked tr { display: grid; border-bottom: 1px solid var(--grid);
+    grid-template-columns: repeat(var(--values), minmax(0, 1fr)); }
+  .stacked th, .stacked td { border: 0; text-align: left; white-space: normal;
+    overflow-wrap: anywhere; }
+  .stacked tr > :first-child { grid-column: 1 / -1; padding-bottom: 0; }
+  .stacked tbody th { color: var(--muted); }
 }
 @media print {
   body { max-width: none; padding: 0; font-size: 10pt; }
@@ -131,10 +138,18 @@ def figures(drawn: Sequence[Drawn]) -> str:
     return "\n".join(['<div class="figures">', *parts, "</div>"])
 
 
-def table(caption: str, head: Sequence[object], rows: Iterable[Sequence[object]]) -> str:
+def table(
+    caption: str, head: Sequence[object], rows: Iterable[Sequence[object]], *, stacked: bool = False
+) -> str:
     """Return a table; the first cell of a row is its heading, the others are values.
 
     A table wider than the page scrolls separately, also by keyboard.
+
+    Args:
+        caption: What the table shows.
+        head: The heading of each column.
+        rows: The cells of each row.
+        stacked: Whether a narrow page has the heading of a row above its values.
     """
     top = "".join(
         f'<th scope="col"{_class(cell) if k else ""}>{text(cell)}</th>'
@@ -146,9 +161,11 @@ def table(caption: str, head: Sequence[object], rows: Iterable[Sequence[object]]
         + "</tr>"
         for row in rows
     )
+    how = f' class="stacked" style="--values: {len(head) - 1}"' if stacked else ""
     # tabindex puts the table in the keyboard's order, which it must be in to scroll.
     return (
-        f'<div class="scroll" role="region" tabindex="0" aria-label="{text(caption)}">\n<table>\n'
+        f'<div class="scroll" role="region" tabindex="0" aria-label="{text(caption)}">\n'
+        f"<table{how}>\n"
         f"<caption>{text(caption)}</caption>\n<thead><tr>{top}</tr></thead>\n"
         f"<tbody>\n{body}\n</tbody>\n</table>\n</div>"
     )
