@@ -86,6 +86,46 @@ def test_ignored_interrupt_stays_ignored_and_the_other_signal_does_not(shell: Sh
         assert Path(sent.name).exists() == (status == 0)
 
 
+EARLY = """
+import os, sys
+from fivebar_sim.cli import main
+def told(event, args):
+    if event == "import" and args[0] == "fivebar_sim.cli.program":
+        os.kill(os.getpid(), {sent})
+sys.addaudithook(told)
+sys.exit(main())
+"""
+"""The program, that gets a signal before anything slow is imported."""
+LATE = """
+import atexit, os, sys, time
+from fivebar_sim.cli import main
+def told():
+    os.kill(os.getpid(), {sent})
+    time.sleep(9.0)
+atexit.register(told)
+sys.exit(main())
+"""
+"""The program, that gets a signal when it has ended and the interpreter tidies up."""
+
+
+@pytest.mark.parametrize(("sent", "status", "said"), ENDS)
+def test_signal_while_the_program_is_imported_waits_until_it_is_heard(
+    shell: Shell, sent: signal.Signals, status: int, said: str
+) -> None:
+    command = [sys.executable, "-c", EARLY.format(sent=int(sent)), "run", "short.toml"]
+    with started(command, text=True) as process:
+        assert process.communicate() == ("", said)
+    assert process.returncode == status
+
+
+@pytest.mark.parametrize("sent", [signal.SIGINT, signal.SIGTERM])
+def test_signal_at_the_very_end_leaves_no_traceback(sent: signal.Signals) -> None:
+    command = [sys.executable, "-c", LATE.format(sent=int(sent)), "--version"]
+    with started(command, text=True) as process:
+        assert process.communicate()[1] == ""
+    assert process.returncode == -sent
+
+
 def test_half_made_recording_is_no_matter_for_stderr() -> None:
     """Rerun warns of data that nobody takes: what a signal ends has such."""
     code = """

@@ -1,5 +1,21 @@
 """The program `fivebar`."""
 
-from fivebar_sim.cli.program import main
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
 
 __all__ = ["main"]
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the command line; return its exit status."""
+    from fivebar_sim.cli import signals
+
+    # What comes while the program itself is imported waits until somebody listens.
+    with signals.held():
+        from fivebar_sim.cli import program
+
+        return program.main(argv)

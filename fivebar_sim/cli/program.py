@@ -13,7 +13,6 @@ import shutil
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from importlib.metadata import version
 from typing import Any
 
 from fivebar_sim.cli import memory, signals, terminal
@@ -100,6 +99,9 @@ def _main(args: list[str]) -> int:
 def _call(args: list[str]) -> int:
     """Parse the arguments and call the command."""
     if args == ["--version"]:
+        # Slow to import, and only this needs it.
+        from importlib.metadata import version
+
         print(f"fivebar-sim {version('fivebar-sim')}")  # noqa: T201
         return 0
 

@@ -8,6 +8,7 @@ until it gets through, but never into the clean-up that it caused.
 from __future__ import annotations
 
 import _thread
+import atexit
 import signal
 import sys
 import threading
@@ -17,8 +18,49 @@ from contextlib import contextmanager
 PATIENCE = 0.2
 """Time that an exception gets to pass through before it is raised again [s]."""
 
+USUAL = {signal.SIGINT: signal.default_int_handler, signal.SIGTERM: signal.SIG_DFL}
+"""The handlers that a Python program starts with, and that `listen` exchanges."""
+
+_held: set[signal.Signals] = set()
+"""The signals that `held` makes wait."""
+
 _sent: list[int] = []
 """The first signal that came, if any."""
+
+
+@contextmanager
+def held() -> Iterator[None]:
+    """Within, Ctrl-C and SIGTERM wait for `listen`, which lets them through.
+
+    At the end of the process they end it as they would end any other: no traceback tells of one
+    that comes while the interpreter tidies up.
+    """
+    # Windows has no such masks; another thread's would be of no use.
+    if not _is_ours() or not hasattr(signal, "pthread_sigmask"):
+        yield
+        return
+
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, USUAL)
+    _held.update(set(USUAL) - before)
+    try:
+        yield
+    finally:
+        _held.clear()
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+        # What is registered last is called first; once is enough, however often main is called.
+        atexit.unregister(_let_go)
+        atexit.register(_let_go)
+
+
+def _let_go() -> None:
+    """Leave Ctrl-C to the system, unless it is ignored."""
+    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
+        signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+
+def _is_ours() -> bool:
+    """Return whether this is the main thread: no other one may have signal handlers."""
+    return threading.current_thread() is threading.main_thread()
 
 
 @contextmanager
@@ -29,13 +71,12 @@ def listen() -> Iterator[None]:
     stays ignored; one with a handler of its own keeps it. Outside the main thread, where Python
     allows no signal handlers, nothing changes.
     """
-    if threading.current_thread() is not threading.main_thread():
+    if not _is_ours():
         yield
         return
 
     _sent.clear()
-    usual = {signal.SIGINT: signal.default_int_handler, signal.SIGTERM: signal.SIG_DFL}
-    before = {n: usual[n] for n in usual if signal.getsignal(n) == usual[n]}
+    before = {n: USUAL[n] for n in USUAL if signal.getsignal(n) == USUAL[n]}
 
     unraisable = sys.unraisablehook
     ended = threading.Event()
@@ -48,6 +89,8 @@ def listen() -> Iterator[None]:
 
     sys.unraisablehook = _quiet
     try:
+        if _held:
+            signal.pthread_sigmask(signal.SIG_UNBLOCK, _held)
         yield
     finally:
         try:
