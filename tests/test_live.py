@@ -22,6 +22,7 @@ from fivebar_sim import rollout
 from fivebar_sim.errors import ConfigError
 from fivebar_sim.recording import live
 from fivebar_sim.recording import viewer as recording_viewer
+from fivebar_sim.recording.relay import Relay
 from fivebar_sim.runs import directory
 from fivebar_sim.scenario import Scenario
 from fivebar_sim.simulation import feedback, steps
@@ -207,6 +208,23 @@ def stalled(monkeypatch: pytest.MonkeyPatch) -> Iterator[str]:
 def test_stalled_viewer_does_not_keep_the_run(shell: Shell, stalled: str) -> None:
     assert shell("run", "short.toml", "--live-at", stalled, "--out", "mine").status == 0
     directory.check_run(shell.folder / "mine")
+
+
+def test_what_a_viewer_does_not_take_makes_it_idle_at_once(stalled: str) -> None:
+    """Time from before the end of the run counts, once the buffers on the way are full."""
+    with Relay(stalled) as relay:
+        host, _, port = relay.address.partition(":")
+        client = socket.create_connection((host, int(port)))
+        assert not relay.full
+        client.settimeout(0.3)
+        with pytest.raises(TimeoutError):
+            client.sendall(bytes(1 << 26))
+        assert relay.full
+        relay.moved -= 1000.0
+        assert relay.idle(time.monotonic()) >= 1000.0
+        relay.full = False
+        assert relay.idle(time.monotonic()) < 1000.0
+        client.close()
 
 
 def test_signal_ends_a_run_whose_viewer_has_stalled(

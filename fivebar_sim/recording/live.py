@@ -45,7 +45,7 @@ ANSWER = 2.0
 """How long a viewer may take to answer HELLO [s]."""
 PATIENCE = 20.0
 """How long a new viewer may take to listen [s]."""
-STALLED = 5.0
+STALLED = 3.0
 """How long a viewer may take nothing of what is left to send before it is given up [s]."""
 FOREVER = 1e6
 """Longer than any viewer takes [s]: it is `finish` that gives up."""
@@ -169,7 +169,7 @@ class _Sender:
         # Waits in pieces, between which a signal is heard.
         while self._thread.is_alive():
             self._thread.join(0.05)
-            if time.monotonic() - max(begun, relay.moved) > STALLED:
+            if relay.idle(begun) > STALLED:
                 break
 
         if self._error is not None:

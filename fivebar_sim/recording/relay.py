@@ -12,11 +12,15 @@ import time
 from collections.abc import Callable
 from contextlib import suppress
 from types import TracebackType
+from typing import Any
 
 from fivebar_sim.recording.viewer import LOOPBACK
 
 PIECE = 1 << 16
 """Bytes passed on at a time."""
+
+Pass = Callable[[socket.socket, socket.socket], None]
+"""Passes bytes from one socket to another until one of them ends."""
 
 
 class Relay:
@@ -25,6 +29,7 @@ class Relay:
     Attributes:
         address: HOST:PORT where it listens.
         moved: When the viewer took or sent bytes last, of `time.monotonic` [s].
+        full: Whether the viewer is offered bytes that it does not take.
     """
 
     def __init__(self, viewer: str) -> None:
@@ -37,6 +42,7 @@ class Relay:
         self._is_cut = False
         self.address = f"{LOOPBACK}:{self._server.getsockname()[1]}"
         self.moved = time.monotonic()
+        self.full = False
         self._start(self._accept)
 
     def __enter__(self) -> Relay:
@@ -57,7 +63,16 @@ class Relay:
             for each in self._open:
                 _end(each)
 
-    def _start(self, work: Callable[..., None], *args: socket.socket) -> None:
+    def idle(self, since: float) -> float:
+        """Return how long the viewer has moved no bytes [s].
+
+        Args:
+            since: The time from which that counts, unless it did not take what was there before, of
+                `time.monotonic` [s].
+        """
+        return time.monotonic() - (self.moved if self.full else max(since, self.moved))
+
+    def _start(self, work: Callable[..., None], *args: Any) -> None:
         # Daemons: none of them keeps the program alive.
         threading.Thread(target=work, args=args, daemon=True).start()
 
@@ -66,8 +81,8 @@ class Relay:
             while True:
                 client = self._keep(self._server.accept()[0])
                 viewer = self._keep(socket.create_connection(self._viewer))
-                self._start(self._pass, client, viewer)
-                self._start(self._pass, viewer, client)
+                self._start(self._pass, self._give, client, viewer)
+                self._start(self._pass, self._take, viewer, client)
 
     def _keep(self, each: socket.socket) -> socket.socket:
         """Remember a socket to be cut."""
@@ -77,15 +92,27 @@ class Relay:
                 _end(each)
         return each
 
-    def _pass(self, source: socket.socket, sink: socket.socket) -> None:
-        """Pass bytes on in one direction until either side ends."""
+    def _pass(self, work: Pass, source: socket.socket, sink: socket.socket) -> None:
+        """Pass bytes on in one direction; then end both sides."""
         with suppress(OSError):
-            while data := source.recv(PIECE):
-                sink.sendall(data)
-                self.moved = time.monotonic()
+            work(source, sink)
         # Each side learns that the other one has gone.
         _end(source)
         _end(sink)
+
+    def _give(self, client: socket.socket, viewer: socket.socket) -> None:
+        """Pass bytes on to the viewer until either side ends."""
+        while data := client.recv(PIECE):
+            self.full = True
+            viewer.sendall(data)
+            self.full = False
+            self.moved = time.monotonic()
+
+    def _take(self, viewer: socket.socket, client: socket.socket) -> None:
+        """Pass bytes on from the viewer until either side ends."""
+        while data := viewer.recv(PIECE):
+            client.sendall(data)
+            self.moved = time.monotonic()
 
 
 def _end(each: socket.socket) -> None:
