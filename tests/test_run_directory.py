@@ -20,7 +20,7 @@ from shell import CSV
 from fivebar_sim import report, rollout
 from fivebar_sim.report import single
 from fivebar_sim.rollout import Result
-from fivebar_sim.runs import directory
+from fivebar_sim.runs import checksums, directory
 from fivebar_sim.runs.directory import FILES
 from fivebar_sim.scenario import Scenario
 
@@ -252,3 +252,24 @@ def test_a_users_file_that_an_edited_scenario_names_is_not_the_runs(
     (where / "scenario.toml").write_text(scenario, encoding="utf-8")
     result.write(where)
     assert names(where) == {*FILES, "better.csv"}
+
+
+@pytest.mark.usefixtures("light")
+def test_a_record_that_lists_the_files_of_others_deletes_none(
+    tmp_path: Path, result: Result
+) -> None:
+    where = result.write(tmp_path / "mine")
+    precious = [where / "notes.txt", tmp_path / "notes.csv", tmp_path / "whole.csv"]
+    for file in precious:
+        file.write_text("precious", encoding="utf-8")
+    record = where / checksums.RECORD
+    names_of_others = ["notes.txt", "../notes.csv", str(precious[2])]
+    sums = checksums.of_files(where, names_of_others)
+    table = pq.read_table(record).replace_schema_metadata(checksums.written(sums))
+    pq.write_table(table, record)
+
+    result.write(where)
+    assert names(where) == {*FILES, "notes.txt"}
+    pq.write_table(table, record)
+    directory.discard(where, "it diverged")
+    assert all(file.exists() for file in precious)

@@ -53,16 +53,19 @@ def read(metadata: Mapping[bytes, bytes] | None) -> dict[str, str]:
         return {}
 
 
-def listed(folder: Path) -> set[str]:
-    """Return the names of the files that a run directory's record has checksums of."""
+def copies(folder: Path) -> set[str]:
+    """Return the names of the CSVs that a run wrote into its directory, as its record has them."""
     import pyarrow
     import pyarrow.parquet
 
     try:
         with (folder / RECORD).open("rb") as file:
-            return set(read(pyarrow.parquet.read_schema(file).metadata))
+            sums = read(pyarrow.parquet.read_schema(file).metadata)
     except (OSError, pyarrow.ArrowException):
         return set()
+
+    # They are going to be deleted: a record that somebody made must not name anything else.
+    return {name for name in sums if name.endswith(".csv") and name == Path(name).name}
 
 
 def check_files(folder: Path, sums: Sums) -> None:

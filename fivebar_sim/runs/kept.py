@@ -26,7 +26,7 @@ UNLINKED = {errno.EPERM, errno.EACCES, errno.ENOTSUP, errno.EXDEV, errno.EMLINK,
 def own_names(path: Path) -> set[str]:
     """Return the names of a run's own files: `FILES`, its scenario's, its report, `DIVERGED`."""
     # Not those that its scenario.toml names: who has edited it may have named a file of their own.
-    return {*FILES, *checksums.listed(path), REPORT, DIVERGED}
+    return {*FILES, *checksums.copies(path), REPORT, DIVERGED}
 
 
 def keep(path: Path, stage: Path) -> None:
