@@ -20,7 +20,7 @@ from fivebar_sim.arrays import Array
 from fivebar_sim.errors import FiveBarError
 from fivebar_sim.metrics.columns import Record
 from fivebar_sim.metrics.measured import Judged
-from fivebar_sim.recording import foot, ground, layout
+from fivebar_sim.recording import file_stream, foot, ground, layout
 from fivebar_sim.recording import leg as scene
 from fivebar_sim.recording.check import PROPERTY
 from fivebar_sim.recording.look import Look, looks
@@ -44,6 +44,8 @@ if TYPE_CHECKING:
     from fivebar_sim.scenario import Scenario
 
 APPLICATION = "fivebar"
+CHUNK = 65_536
+"""Most rows of a plot that are sent at once: Rerun copies them several times."""
 LOCK = threading.RLock()
 """Held by a session; its thread may open another within, as when it writes a run that it shows."""
 _sessions = 0
@@ -76,11 +78,10 @@ def write(path: Path, runs: Sequence[Run], labels: Sequence[str] = ()) -> None:
     """Write the recording of one or more runs to a .rrd file; several are drawn over each other.
 
     Timelines: `sim_time` (the record's time, to the nanosecond) and `step` (from 1: t = step h).
-    Series have every row of the record, poses one row every `POSE_PERIOD` and the last one. The
-    bytes are complete before the file is opened, so a failing disk raises a plain OSError.
+    Series have every row of the record, poses one row every `POSE_PERIOD` and the last one.
 
     Args:
-        path: The file; an existing one is overwritten.
+        path: The file; an existing one is overwritten, and gone if this fails.
         runs: The runs to draw, at least one. Each of several has its own colour, and its entities
             are under run_1, run_2, ...
         labels: Names of the runs, all different; by default the names of their scenarios.
@@ -91,8 +92,15 @@ def write(path: Path, runs: Sequence[Run], labels: Sequence[str] = ()) -> None:
     """
     names = list(labels) or [run.scenario.name for run in runs]
     with session():
-        data = _encode(runs, names)
-    path.write_bytes(data)
+        stream = started(" + ".join(names))
+        try:
+            with path.open("wb") as file, file_stream.into(stream, file):
+                _send(stream, runs, names)
+        except BaseException:
+            # Half a recording helps nobody; a device is no file.
+            if path.is_file():
+                path.unlink()
+            raise
 
 
 @contextmanager
@@ -133,26 +141,13 @@ def _load() -> None:
             del os.environ["RUST_LOG"]
 
 
-def _encode(runs: Sequence[Run], names: list[str]) -> bytes:
-    """Return the bytes of the recording."""
-    stream = started(" + ".join(names))
-    output = stream.binary_stream()
-    try:
-        _send(stream, runs, names)
-    finally:
-        # Read also when a signal breaks in: Rerun warns of bytes that nobody has read.
-        data = output.read()
-    assert data is not None
-    return data
-
-
 def _send(stream: rr.RecordingStream, runs: Sequence[Run], names: list[str]) -> None:
     """Send the layout, the text, the floor and all runs."""
     import rerun as rr
 
     shown = looks(names)
     moved = [drawn_motion(run.record, drawn_rows(run.record["time"])) for run in runs]
-    plots = [list(series(run.scenario, run.record)) for run in runs]
+    plots = [list(series(run.scenario, _head(run.record))) for run in runs]
     room = room_of([run.scenario.leg for run in runs], moved)
     text = summary(
         names,
@@ -164,8 +159,13 @@ def _send(stream: rr.RecordingStream, runs: Sequence[Run], names: list[str]) -> 
     stream.log(layout.SUMMARY, rr.TextDocument(text, media_type="text/markdown"), static=True)
     log_room(stream, room)
 
-    for run, look, poses, lines in zip(runs, shown, moved, plots, strict=True):
-        _send_run(stream, run, look, poses, lines, room)
+    for run, look, poses in zip(runs, shown, moved, strict=True):
+        _send_run(stream, run, look, poses, room)
+
+
+def _head(record: Record) -> Record:
+    """Return so many rows of a record that all its plots are known, but not what they show."""
+    return {name: column[:2] for name, column in record.items()}
 
 
 def started(name: str) -> rr.RecordingStream:
@@ -200,7 +200,6 @@ def _send_run(
     run: Run,
     look: Look,
     moved: DrawnMotion,
-    plots: list[Series],
     room: Room,
 ) -> None:
     """Send one run: the leg's numbers and its motion, the foot, the ground, the plots."""
@@ -209,7 +208,6 @@ def _send_run(
     leg = run.scenario.leg
     time = run.record["time"]
     rows = drawn_rows(time)
-    every = times(time, np.arange(len(time)) + 1)
     drawn = times(time[rows], rows + 1)
     # As JSON, since a plain value keeps the type that it first had.
     stream.send_property(f"{look.root}leg", rr.AnyValues(json=json.dumps(asdict(leg))))
@@ -221,8 +219,20 @@ def _send_run(
     foot.send_foot(stream, leg, moved, look, drawn)
     ground.send_ground(stream, leg, moved, look, drawn, room)
 
-    for plot in plots:
-        send_series(stream, plot, look, every)
+    # One after the other: together they would take more memory than the record.
+    for plot in series(run.scenario, run.record):
+        for steps, part in parts(plot):
+            send_series(stream, part, look, times(time[steps - 1], steps))
+
+
+def parts(plot: Series) -> Iterator[tuple[Rows, Series]]:
+    """Yield the steps, from 1, and the values of a plot, `CHUNK` rows at a time."""
+    sent = 0
+    for begin in range(0, len(plot.shown), CHUNK):
+        shown = plot.shown[begin : begin + CHUNK]
+        values = plot.values[sent : sent + int(shown.sum())]
+        sent += len(values)
+        yield np.arange(begin, begin + len(shown)) + 1, plot._replace(values=values, shown=shown)
 
 
 def times(time: Array, steps: Rows) -> list[rr.TimeColumn]:

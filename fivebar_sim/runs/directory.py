@@ -24,6 +24,9 @@ from fivebar_sim.runs.kept import DIVERGED, FILES, keep, own_names
 
 RECORDING = "recording.rrd"
 
+GROUP = 100_000
+"""Rows of a record that are encoded at once: 20 MB."""
+
 ATTEMPTS = 20
 """How often the exchange is tried while other processes write to the same place."""
 
@@ -176,6 +179,8 @@ def _fill(stage: Path, result: rrd.Run) -> None:
 def write_record(folder: Path, record: Mapping[str, Array], others: Iterable[str]) -> None:
     """Write the record as Parquet, one column each, with checksums that show damage.
 
+    Byte by byte, as all signs and exponents are alike: a third of the size, in a third of the time.
+
     Args:
         folder: The run directory.
         record: The columns.
@@ -188,7 +193,15 @@ def write_record(folder: Path, record: Mapping[str, Array], others: Iterable[str
     table = pyarrow.table(dict(record)).replace_schema_metadata(checksums.written(sums))
     # Given a name instead of a file, pyarrow would expand ~ and read it as a URI.
     with (folder / checksums.RECORD).open("wb") as file:
-        pyarrow.parquet.write_table(table, file, write_page_checksum=True)
+        pyarrow.parquet.write_table(
+            table,
+            file,
+            row_group_size=GROUP,
+            compression="zstd",
+            use_dictionary=False,
+            use_byte_stream_split=True,
+            write_page_checksum=True,
+        )
 
 
 def _exchange(stage: Path, path: Path) -> None:
