@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from tyro.conf import arg
 
-from fivebar_sim.cli.common import Scenarios, Settings, plans_of, screen, spinner
+from fivebar_sim.cli.common import Order, Scenarios, Settings, batches, orders_of, screen, spinner
 from fivebar_sim.cli.terminal import FAILED, WRONG, say
 from fivebar_sim.errors import ConfigError, DivergedError, RunDirectoryError
 
@@ -52,23 +52,25 @@ def check(
     _check_options(keep, updates_changed=update and bool(settings))
     sources = scenarios or tuple(resources.shipped("scenarios"))
     # Everything that can be refused is refused here, before minutes of simulation.
-    plans = plans_of(sources, settings)
-    _check_names(plans)
-    _check_limits(sources, plans)
+    orders = orders_of(sources, settings)
+    _check_names(orders)
+    _check_limits(sources, orders)
     places = [baseline.place(source) for source in sources]
     olds = [baseline.read(place) for place in places]
     _check_places(junit, summary)
 
-    with spinner(f"checking {len(plans)} scenarios", quiet=quiet):
-        results = _results(plans)
+    checked: list[Checked] = []
+    status = 0
+    with spinner(f"checking {len(orders)} scenarios", quiet=quiet):
+        # Of each batch only the verdicts stay: the records of all would not fit in memory.
+        for result, name in _results(orders):
+            each = _judge(name, result, olds[len(checked)])
+            if update:
+                each = _update(each, result, olds[len(checked)], places[len(checked)])
+            # Of a run that cannot be written the others' verdicts still count.
+            status = max(status, _status(each, ok=_keep(each, result, keep)))
+            checked.append(each)
 
-    checked = [_judge(*each) for each in zip(plans, results, olds, strict=True)]
-    if update:
-        checked = [_update(*each) for each in zip(checked, results, olds, places, strict=True)]
-
-    # All runs are kept before any status counts: one that cannot be written must not hide others.
-    kept = [_keep(each, result, keep) for each, result in zip(checked, results, strict=True)]
-    status = max(_status(each, ok=ok) for each, ok in zip(checked, kept, strict=True))
     if not quiet:
         console.print_check(checked, screen())
 
@@ -106,26 +108,33 @@ def _check_places(junit: Path | None, summary: Path | None) -> None:
         whole_file.append(summary, "")
 
 
-def _check_names(plans: list[Plan]) -> None:
+def _check_names(orders: list[Order]) -> None:
     """Raise if two scenarios have the same name: it identifies their verdicts."""
-    names = [planned.scenario.name for planned in plans]
+    names = [order.scenario.name for order in orders]
     for name in names:
         if names.count(name) > 1:
             raise ConfigError(f"two scenarios are called {name!r}: give each its own name")
 
 
-def _check_limits(sources: Sequence[str], plans: list[Plan]) -> None:
+def _check_limits(sources: Sequence[str], orders: list[Order]) -> None:
     """Raise if a scenario sets no limits: whatever it does would be fine."""
-    for source, planned in zip(sources, plans, strict=True):
-        if not planned.scenario.limits:
+    for source, order in zip(sources, orders, strict=True):
+        if not order.scenario.limits:
             raise ConfigError(
                 f"{source}: [limits] must set at least one limit: without any, check has nothing "
                 "to judge"
             )
 
 
-def _results(plans: list[Plan]) -> list[Result | DivergedError]:
-    """Return every plan's result, or the error of one that diverges."""
+def _results(orders: list[Order]) -> Iterator[tuple[Result | DivergedError, str]]:
+    """Yield every scenario's result, or the error of one that diverges, and the scenario's name."""
+    for batch in batches(orders):
+        names = [order.scenario.name for order in batch]
+        yield from zip(_together([order.take() for order in batch]), names, strict=True)
+
+
+def _together(plans: list[Plan]) -> list[Result | DivergedError]:
+    """Return what comes of plans that are simulated together."""
     from fivebar_sim import rollout
 
     try:
@@ -144,13 +153,12 @@ def _run_alone(planned: Plan) -> Result | DivergedError:
         return error
 
 
-def _judge(planned: Plan, result: Result | DivergedError, old: Baseline | None) -> Checked:
+def _judge(name: str, result: Result | DivergedError, old: Baseline | None) -> Checked:
     """Return a scenario's verdict; print the error of one that diverged."""
     from fivebar_sim.regression import comparison
 
     if isinstance(result, DivergedError):
         say(result)
-        name = planned.scenario.name
         return comparison.Checked(name, [], str(result).removeprefix(f"{name}: "), [])
     return comparison.compare(result, old)
 

@@ -1,4 +1,4 @@
-"""Shared by the commands: the types of their arguments, plans, consoles."""
+"""Shared by the commands: the types of their arguments, what they are to run, consoles."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from fivebar_sim.errors import ConfigError, FiveBarError
 
 if TYPE_CHECKING:
     from fivebar_sim.rollout import Plan
+    from fivebar_sim.scenario import Scenario
 
 Scenarios = Positional[Annotated[tuple[str, ...], arg(metavar="[SCENARIO ...]")]]
 Settings = UseAppendAction[Annotated[tuple[str, ...], arg(name="set", metavar="KEY=VALUE")]]
@@ -21,24 +22,70 @@ NARROWEST = 80
 """Columns that tables are laid out for: in fewer, numbers would be cut."""
 
 
-def plans_of(scenarios: Iterable[str], settings: Sequence[str]) -> list[Plan]:
-    """Return the plans of all scenarios, so that all are validated before the first one runs."""
+TOGETHER = 200_000
+"""Steps, over all scenarios, whose plans are kept, and whose runs are simulated, at one time: with
+their records some 120 MB."""
+
+
+class Order:
+    """A scenario to run: its plan has been checked.
+
+    Args:
+        scenario: The scenario.
+        plan: Its plan; None where it would take too much memory until it is needed.
+    """
+
+    def __init__(self, scenario: Scenario, plan: Plan | None) -> None:
+        self.scenario = scenario
+        self._plan = plan
+
+    def take(self) -> Plan:
+        """Return the plan, which is then forgotten here, or make it again."""
+        from fivebar_sim import rollout
+
+        kept = self._plan
+        self._plan = None
+        return rollout.plan(self.scenario) if kept is None else kept
+
+
+def orders_of(scenarios: Iterable[str], settings: Sequence[str]) -> list[Order]:
+    """Return all scenarios with checked plans, so that all are validated before the first runs."""
     from fivebar_sim import rollout
     from fivebar_sim.files import resources
     from fivebar_sim.scenario import Scenario
 
     chosen = list(scenarios) or list(resources.shipped("scenarios"))
     loaded = [(source, Scenario.load(source, settings)) for source in chosen]
-    plans = []
     # Planning allocates arrays for every step already, so memory is checked before.
-    memory.check(sum(scenario.steps for _, scenario in loaded))
+    steps = [scenario.steps for _, scenario in loaded]
+    memory.check(max(*steps, min(sum(steps), TOGETHER)))
 
+    orders = []
+    kept = 0
     for source, scenario in loaded:
         try:
-            plans.append(rollout.plan(scenario))
+            plan = rollout.plan(scenario)
         except FiveBarError as error:
             raise ConfigError(f"{source}: {error}") from None
-    return plans
+        fits = kept + scenario.steps <= TOGETHER or len(loaded) == 1
+        kept += scenario.steps if fits else 0
+        orders.append(Order(scenario, plan if fits else None))
+    return orders
+
+
+def batches(orders: Sequence[Order]) -> Iterator[list[Order]]:
+    """Yield the orders in their order, as many at a time as may run at one time, at least one."""
+    batch: list[Order] = []
+    steps = 0
+    for order in orders:
+        if batch and steps + order.scenario.steps > TOGETHER:
+            yield batch
+            batch = []
+            steps = 0
+        batch.append(order)
+        steps += order.scenario.steps
+    if batch:
+        yield batch
 
 
 def screen(*, stderr: bool = False, quiet: bool = False):

@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from tyro.conf import arg
 
-from fivebar_sim.cli.common import Scenarios, Settings, plans_of, screen, spinner
+from fivebar_sim.cli.common import Order, Scenarios, Settings, orders_of, screen, spinner
 from fivebar_sim.cli.terminal import FAILED, say
 from fivebar_sim.errors import ConfigError, DivergedError
 
 if TYPE_CHECKING:
-    from fivebar_sim.rollout import Plan, Result
-    from fivebar_sim.simulation.steps import Watch
+    from fivebar_sim.rollout import Result
 
 
 def run(
@@ -47,13 +45,13 @@ def run(
     """
     from fivebar_sim.runs import directory
 
-    plans = plans_of(scenarios, settings)
-    places = _places(plans, out)
+    orders = orders_of(scenarios, settings)
+    places = _places(orders, out)
     # A place that cannot be written must not cost a simulation first.
     for place in places:
         directory.check_place(place)
     viewer = _viewer(live_at) if live or live_at is not None else None
-    return _run(plans, places, viewer, quiet=quiet, as_json=json)
+    return _run(orders, places, viewer, quiet=quiet, as_json=json)
 
 
 def _viewer(address: str | None) -> str:
@@ -67,30 +65,30 @@ def _viewer(address: str | None) -> str:
     return live.spawn_viewer()
 
 
-def _execute(planned: Plan, viewer: str | None, place: Path) -> Result:
-    """Simulate and write one plan, streaming it to a viewer if there is one."""
+def _execute(order: Order, viewer: str | None, place: Path) -> Result:
+    """Simulate and write one scenario, streaming it to a viewer if there is one."""
     from fivebar_sim import rollout
 
-    with _watcher(planned, viewer) as watch:
+    if viewer is None:
+        # The plan is gone before anything is written: it takes as much memory as the record.
+        result = rollout.execute(order.take())
+        _write(result, place)
+        return result
+
+    from fivebar_sim.recording import live
+
+    planned = order.take()
+    with live.streaming(planned, viewer) as watch:
         result = rollout.execute(planned, watch)
         # Before the viewer has everything: one that has stalled must not cost the result.
         _write(result, place)
     return result
 
 
-def _watcher(planned: Plan, viewer: str | None) -> AbstractContextManager[Watch | None]:
-    """Return a context that shows the states of a run in a viewer, if there is one."""
-    if viewer is None:
-        return nullcontext()
-    from fivebar_sim.recording import live
-
-    return live.streaming(planned, viewer)
-
-
 def _run(
-    plans: list[Plan], places: list[Path], viewer: str | None, *, quiet: bool, as_json: bool
+    orders: list[Order], places: list[Path], viewer: str | None, *, quiet: bool, as_json: bool
 ) -> int:
-    """Run the plans one after another; return the highest exit status."""
+    """Run the scenarios one after another; return the highest exit status."""
     import json
 
     from fivebar_sim.cli import console
@@ -99,11 +97,11 @@ def _run(
     status = 0
     metrics = {}
     out = screen()
-    for planned, place in zip(plans, places, strict=True):
-        name = planned.scenario.name
+    for order, place in zip(orders, places, strict=True):
+        name = order.scenario.name
         try:
             with spinner(f"simulating {name}", quiet=quiet):
-                result = _execute(planned, viewer, place)
+                result = _execute(order, viewer, place)
         # The other scenarios still run.
         except DivergedError as error:
             say(error)
@@ -117,7 +115,7 @@ def _run(
             console.print_result(result, str(place), out)
 
     if as_json:
-        shown = next(iter(metrics.values()), None) if len(plans) == 1 else metrics
+        shown = next(iter(metrics.values()), None) if len(orders) == 1 else metrics
         print(json.dumps(shown, indent=2, allow_nan=False))  # noqa: T201
     return status
 
@@ -134,16 +132,16 @@ def _write(result: Result, place: Path) -> None:
         report.write([place], place / REPORT)
 
 
-def _places(plans: list[Plan], out: str | None) -> list[Path]:
-    """Return the run directory of every plan.
+def _places(orders: list[Order], out: str | None) -> list[Path]:
+    """Return the run directory of every scenario.
 
     Raises:
         ConfigError: --out is empty, or two scenarios have the same name and so the same place.
     """
     if out == "":
         raise ConfigError("--out must name a directory, got ''")
-    names = [planned.scenario.name for planned in plans]
-    if out is not None and len(plans) == 1:
+    names = [order.scenario.name for order in orders]
+    if out is not None and len(orders) == 1:
         return [Path(out)]
     twice = sorted({name for name in names if names.count(name) > 1})
     if twice:
