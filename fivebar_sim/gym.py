@@ -117,7 +117,7 @@ class LegEnv(gymnasium.Env[Array, Array]):
         if self.render_mode is None:
             return None
         if self._picture is None:
-            self._picture = LegPicture(self._group.models[0], self.task.leg)
+            self._picture = LegPicture(self._group.model, self.task.leg)
         return self._picture.take(self.episodes.qpos[0])
 
     def close(self) -> None:

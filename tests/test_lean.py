@@ -74,6 +74,17 @@ def test_what_acts_or_is_recorded_is_kept(scene: str, servo: Servo, kept: set[An
     assert {flag for flag in chosen if not flags & flag.value} == kept
 
 
+def test_motion_alone_has_the_same_bits_without_the_grounds_force() -> None:
+    built = model.build(CLASSIC, scene=Rail(mass=0.5, drop=0.01, friction=1.0))
+    assert lean.left_out(built, forces=False) & OFF.mjDSBL_SENSOR.value
+    ctrl = commands(built, 100)
+    states = Legs(built, starts(built)).advance(ctrl)
+    qpos, qvel, warnings = Legs(built, starts(built), forces=False).moved(ctrl)
+    np.testing.assert_array_equal(qpos, states.qpos)
+    np.testing.assert_array_equal(qvel, states.qvel)
+    np.testing.assert_array_equal(warnings, states.warnings)
+
+
 def test_spring_that_somebody_adds_is_kept() -> None:
     for name in ("jnt_stiffness", "tendon_stiffness"):
         built = model.build(CLASSIC)

@@ -30,10 +30,14 @@ _stopped: list[int | None] = []
 """MuJoCo's clock, once for every `without_clock` that is going on."""
 
 
-def lean(models: Sequence[mujoco.MjModel]) -> list[mujoco.MjModel]:
+def lean(models: Sequence[mujoco.MjModel], *, forces: bool = True) -> list[mujoco.MjModel]:
     """Return copies that are stepped faster, to the same states: one for all models that are equal.
 
     See `left_out`. Sensors that are not recorded stay at zero.
+
+    Args:
+        models: The models.
+        forces: Whether the ground's force is recorded.
     """
     alone = len({id(model) for model in models}) == 1
     copies: dict[bytes, mujoco.MjModel] = {}
@@ -45,7 +49,7 @@ def lean(models: Sequence[mujoco.MjModel]) -> list[mujoco.MjModel]:
         name = b"" if alone else _digest(model)
         names[id(model)] = name
         if name not in copies:
-            copies[name] = _short(model)
+            copies[name] = _short(model, forces=forces)
     return [copies[names[id(model)]] for model in models]
 
 
@@ -56,14 +60,14 @@ def _digest(model: mujoco.MjModel) -> bytes:
     return hashlib.blake2b(whole.data, digest_size=16).digest()
 
 
-def _short(model: mujoco.MjModel) -> mujoco.MjModel:
+def _short(model: mujoco.MjModel, *, forces: bool) -> mujoco.MjModel:
     short = copy.copy(model)
-    short.opt.disableflags |= left_out(model)
+    short.opt.disableflags |= left_out(model, forces=forces)
     short.sensor_needstage[~_recorded(model)] = mujoco.mjtStage.mjSTAGE_NONE.value
     return short
 
 
-def left_out(model: mujoco.MjModel) -> int:
+def left_out(model: mujoco.MjModel, *, forces: bool = True) -> int:
     """Return the flags of what MuJoCo can leave out of a leg's steps, bit by bit the same.
 
     Always the search for islands, since the loop makes one of the leg, and the one for pairs within
@@ -72,7 +76,7 @@ def left_out(model: mujoco.MjModel) -> int:
     """
     off = mujoco.mjtDisableBit
     chosen = [off.mjDSBL_ISLAND, off.mjDSBL_MIDPHASE]
-    if not _recorded(model).any():
+    if not (forces and _recorded(model).any()):
         chosen.append(off.mjDSBL_SENSOR)
     if not can_touch(model):
         chosen.append(off.mjDSBL_CONTACT)

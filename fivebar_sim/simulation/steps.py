@@ -79,6 +79,7 @@ class Legs:
         models: One model for all simulations, or one each (of one structure and timestep).
         qpos: Start poses, (nsim, nq).
         nthread: Threads; 0 is one for every processor.
+        forces: Whether anyone asks for the ground's force: not of legs of which only `moved` is.
 
     Raises:
         ArgumentError: Poses that do not fit the model.
@@ -89,9 +90,11 @@ class Legs:
         models: mujoco.MjModel | Sequence[mujoco.MjModel],
         qpos: Array,
         nthread: int = 1,
+        *,
+        forces: bool = True,
     ) -> None:
         shared = isinstance(models, mujoco.MjModel)
-        stepped = lean([models] if shared else models)
+        stepped = lean([models] if shared else models, forces=forces)
         first = stepped[0]
         if qpos.ndim != 2 or qpos.shape[1] != first.nq:
             raise ArgumentError(f"qpos must have shape (nsim, {first.nq}), got {qpos.shape}")
@@ -115,6 +118,24 @@ class Legs:
         Raises:
             ArgumentError: Commands of another shape, or that are not finite.
         """
+        record = (STATE, *STEP) if self._ground is None else (STATE, *STEP, "sensordata")
+        out = self._taken(ctrl, record)
+        # A step that keeps a torque limit may have been sent another command.
+        arrays = [out[STATE], *(out[name] for name in record[1:])]
+        return self.states(arrays, ctrl.copy(), self._batch.warning)
+
+    def moved(self, ctrl: Array) -> tuple[Array, Array, NDArray[Any]]:
+        """Return qpos and qvel after the next steps, (nsim, n, nq), and the warnings so far.
+
+        Arguments and errors are those of `advance`.
+        """
+        state = self._taken(ctrl, (STATE,))[STATE]
+        nq, nv, _ = self._sizes
+        warnings = self._batch.warning[..., 1].sum(axis=1)
+        return state[..., 1 : 1 + nq], state[..., 1 + nq : 1 + nq + nv], warnings
+
+    def _taken(self, ctrl: Array, record: Sequence[Any]) -> dict[Any, Array]:
+        """Return what is recorded of the next steps; see `advance`."""
         nu = self._sizes[2]
         nsim = self._batch.nsim
         if ctrl.ndim != 3 or ctrl.shape[::2] != (nsim, nu):
@@ -122,16 +143,10 @@ class Legs:
         if not np.isfinite(ctrl).all():
             raise ArgumentError("ctrl must be finite: MuJoCo would reset the leg and go on")
 
-        record = (STATE, *STEP) if self._ground is None else (STATE, *STEP, "sensordata")
         with without_log(), without_clock():
             if self._clipping is None:
-                out = self._batch.rollout(ctrl.shape[1], ctrl, record=record)
-            else:
-                out = rollout(self._batch, self._clipping, ctrl, record)
-
-        # A step that keeps a torque limit may have been sent another command.
-        arrays = [out[STATE], *(out[name] for name in record[1:])]
-        return self.states(arrays, ctrl.copy(), self._batch.warning)
+                return self._batch.rollout(ctrl.shape[1], ctrl, record=record)
+            return rollout(self._batch, self._clipping, ctrl, record)
 
     def states(self, arrays: Sequence[Any], ctrl: Array, warnings: NDArray[Any]) -> States:
         """Return states from what `live` lists, of some steps each, (nsim, n, ...).

@@ -32,7 +32,7 @@ class LegGroup:
     Attributes:
         task: The task, with its path spelt out.
         drawn: The task with each leg's own numbers, n of them.
-        models: The legs' models, n of them.
+        model: The first leg's model, to draw it; the legs are stepped with copies.
         episodes: The legs' episodes.
 
     Raises:
@@ -47,9 +47,10 @@ class LegGroup:
         nthread: int = 1,
     ) -> None:
         self.task = task.resolved()
-        self.drawn, self.models, starts = prepare(self.task, seeds, randomise)
+        self.drawn, models, starts = prepare(self.task, seeds, randomise)
         self.episodes = Episodes(self.task, self.drawn, starts)
-        self._legs = _Legs(self.models, starts[:, 0], nthread)
+        self._legs = _Legs(models, starts[:, 0], nthread, forces=False)
+        self.model = models[0]
         self._over = np.zeros(len(seeds), dtype=bool)
         self._random: list[np.random.Generator] = []
 
@@ -72,8 +73,7 @@ class LegGroup:
         """
         if not self._random:
             raise ArgumentError("step comes after reset")
-        states = self._legs.advance(self.episodes.commands(action))
-        self.episodes.update(states.qpos, states.qvel, states.warnings)
+        self.episodes.update(*self._legs.moved(self.episodes.commands(action)))
         # The action of a leg that was over is thrown away: Gymnasium's next-step autoreset.
         if self._over.any():
             self._begin(np.flatnonzero(self._over))
