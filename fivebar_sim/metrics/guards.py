@@ -433,9 +433,8 @@ GUARDS = (
     Rule(
         "jolts",
         _jolted,
-        "a command jumped: a motor's torque went up and back within one step by more than {} of "
-        "the largest",
-        ", by {} at worst: shorten the timestep, or ease path or bus",
+        "a command jumped: torque of more than {} of the largest did not last a step",
+        ", {} at worst: shorten the timestep, or ease path or bus",
         1e2,
         "%",
     ),

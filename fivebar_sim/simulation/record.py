@@ -29,6 +29,9 @@ from fivebar_sim.simulation import sampling
 from fivebar_sim.simulation.plan import Plan
 from fivebar_sim.simulation.steps import States
 
+FAINTEST = 1e-9
+"""Largest torque of a run in which nothing moves or weighs anything [N m]: it is all rounding."""
+
 
 class Part(NamedTuple):
     """Some steps of one simulation that follow each other.
@@ -109,20 +112,28 @@ def growth(planned: Plan, record: Record) -> Array | None:
 
 
 def jolts(planned: Plan, record: Record) -> Array | None:
-    """Return the torque of each motor that lasts a single step, (N, 2); None in torque drive.
+    """Return the torque that lasts a single step, as a part of the run's largest, (N,).
 
-    A bus may miss such a torque, or hold it for many steps, by chance: so what the controller feeds
-    forward counts before the bus.
+    So does torque that should, but that the run does not show: what a bus makes of a jump by
+    chance, missing it or holding it for many steps, and what dies out within the step. None in
+    torque drive.
     """
     if _drive(planned) == "torque":
         return None
 
-    found = lasting.lone(motors(record, "torque"), np.zeros(2))
-    asked = planned.asked
+    torque = motors(record, "torque")
+    found = lasting.lone(torque, np.zeros(2))
     sent = planned.setpoints
-    if asked is None or sent is None or np.array_equal(asked, sent):
-        return found
+    asked = planned.asked
+    if sent is not None and asked is not None and sent is not asked:
+        found = np.maximum(found, _fed(planned, asked))
+        found = np.maximum(found, _missed(planned, sent, torque))
+    largest = max(float(np.abs(torque).max()), FAINTEST)
+    return found.max(axis=1) / largest
 
+
+def _fed(planned: Plan, asked: Array) -> Array:
+    """Return the torque for a single step that setpoints feed forward [N m], (N, 2)."""
     scenario = planned.scenario
     wanted = planned.motion
     needed = dynamics.step_torques(
@@ -130,8 +141,27 @@ def jolts(planned: Plan, record: Record) -> Array | None:
     )
     # In both: the motion needs it, and a setpoint asks for it. One alone may turn round as fast.
     start = wanted.q[0, MOTOR_JOINTS]
-    fed = scenario.servo.kp * lasting.lone(asked, start)
-    return np.maximum(found, np.minimum(fed, lasting.lone(needed, np.zeros(2))))
+    told = scenario.servo.kp * lasting.lone(asked, start)
+    return np.minimum(told, lasting.lone(needed, np.zeros(2)))
+
+
+def _missed(planned: Plan, sent: Array, torque: Array) -> Array:
+    """Return by how much jumps of the setpoints ask for more than the run shows [N m], (N, 2).
+
+    Before the motor moves, a jump by d asks for kp d more than there was.
+    """
+    servo = planned.scenario.servo
+    start = planned.motion.q[:1, MOTOR_JOINTS]
+    jump = servo.kp * np.diff(sent, axis=0, prepend=start)
+    if planned.scenario.command == 1:
+        # Sent in every step, the rest of it is the motion, which a motor sees coming.
+        jump = np.clip(jump, -servo.kp * servo.resolution, servo.kp * servo.resolution)
+
+    before = np.concatenate([np.zeros((1, 2)), torque[:-1]])
+    asked = np.abs(before + jump)
+    if servo.limit is not None:
+        asked = np.minimum(asked, servo.limit)
+    return np.where(jump != 0.0, np.maximum(asked - np.abs(torque).max(), 0.0), 0.0)
 
 
 def lowest(built: mujoco.MjModel) -> float:
