@@ -26,6 +26,15 @@ CASES = (
         ("load", "torque_rms", "A"),
     ),
     (
+        "classic-ellipse",
+        (
+            *("duration=0.75", "path.ramp=0.0", "servo={kp=13.7,kd=0.079}"),
+            *("leg.armature=5e-6", "sim.timestep=0.0005"),
+        ),
+        "the largest torque of A is that of the first 10 steps, in which the run starts",
+        ("load", "torque_peak", "A"),
+    ),
+    (
         "treadmill-trot",
         ("duration=0.5", "controller={name='impedance',stiffness=[6400,6400],damping=[9,9]}"),
         "the timestep damps the feedback: errors die out at ",

@@ -9,7 +9,7 @@ import numpy as np
 from fivebar_sim import motion
 from fivebar_sim.arrays import Array
 from fivebar_sim.control import Feedback
-from fivebar_sim.metrics.columns import motors
+from fivebar_sim.metrics.columns import MOTORS, motors
 from fivebar_sim.metrics.guards import Guard
 from fivebar_sim.scenario import Scenario
 from fivebar_sim.scenario.scenes import Ground
@@ -23,6 +23,9 @@ SPRUNG = 0.15
 
 DAMPED = 0.5
 """The same of a feedback controller: what it holds for long is less sensitive to it."""
+
+FIRST = 10
+"""Steps in which a run starts: what is held, and perhaps moves, sets in at once."""
 
 CHECK = "`fivebar converge` tells by how much"
 
@@ -39,7 +42,12 @@ def warnings(scenario: Scenario, record: Mapping[str, Array], guards: list[Guard
     """
     if scenario.converge:
         return []
-    found = (_jolted(guards), _sprung(scenario), _damped(scenario, record, guards))
+    found = (
+        _jolted(guards),
+        _started(scenario, record),
+        _sprung(scenario),
+        _damped(scenario, record, guards),
+    )
     return [each for each in found if each is not None]
 
 
@@ -51,6 +59,21 @@ def _jolted(guards: list[Guard]) -> str | None:
     part = 100.0 * (jolts.value or 0.0)
     return (
         f"torque peaks depend on the timestep: {part:.3g} % of the largest lasted one step; {CHECK}"
+    )
+
+
+def _started(scenario: Scenario, record: Mapping[str, Array]) -> str | None:
+    """Return the warning that the largest torque is that of the start."""
+    # A feedback controller holds each torque for a period: it has no step of its own.
+    if isinstance(scenario.controller, Feedback):
+        return None
+    at = np.abs(motors(record, "torque")).argmax(axis=0)
+    if not (at < FIRST).any():
+        return None
+    motor = MOTORS[int(at.argmin())]
+    return (
+        f"the largest torque of {motor} is that of the first {FIRST} steps, in which the run "
+        f"starts: it depends on the timestep; {CHECK}"
     )
 
 
