@@ -100,9 +100,17 @@ def svg(figure: Figure, key: str, alt: str) -> str:
         key: Key of the figure; its ids start with it.
         alt: What the figure shows, for readers who cannot see it.
     """
+    from matplotlib.backends.backend_svg import FigureCanvasSVG
+
     out = io.StringIO()
+    # What savefig does, which draws twice: once only to find the layout.
+    for patch in (figure.patch, *(ax.patch for ax in figure.axes)):
+        patch.set(facecolor="none", edgecolor="none")
+    if layout := figure.get_layout_engine():
+        layout.execute(figure)
+        figure.set_layout_engine("none")
     # No date and no version of Matplotlib: the same run must give the same bytes.
-    figure.savefig(out, format="svg", transparent=True, metadata={"Date": None})
+    FigureCanvasSVG(figure).print_svg(out, metadata={"Date": None})
     text = re.sub(r"<metadata>.*?</metadata>", "", out.getvalue(), flags=re.DOTALL)
     box = re.search(r'viewBox="([^"]*)"', text)
     assert box is not None
