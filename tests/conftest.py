@@ -14,9 +14,15 @@ from fivebar_sim.files import exchange
 # An ordinary run draws the same examples every time; ./scripts/test --long asks for "random".
 # Neither judges how long an example takes: that is the machine's load, not the code's fault.
 settings.register_profile(
-    "repeatable", deadline=None, suppress_health_check=[HealthCheck.too_slow], derandomize=True
+    "repeatable",
+    deadline=None,
+    suppress_health_check=[HealthCheck.too_slow],
+    derandomize=True,
+    max_examples=40,
 )
-settings.register_profile("random", settings.get_profile("repeatable"), derandomize=False)
+settings.register_profile(
+    "random", settings.get_profile("repeatable"), derandomize=False, max_examples=400
+)
 settings.load_profile("repeatable")
 
 

@@ -106,13 +106,13 @@ def any_baseline(bench: Bench, content: bytes) -> None:
 LEGS = inputs.parts("models/legs", ("classic", "q8bot"))
 SERVOS = inputs.parts("models/servos", ("ideal", "xl330"))
 LAWS = {
-    "scenarios": Law(ELLIPSE.encode(), inputs.scenarios(), any_scenario, 30, 0.35),
-    "settings": Law(["leg.L2=0.065"], inputs.settings(), any_settings, 25, 0.15),
-    "legs": Law(b"L1 = 0.045", LEGS, any_leg, 20, 0.1),
-    "servos": Law(b"kp = 6.0", SERVOS, any_servo, 20, 0.1),
-    "paths": Law(FOOT, inputs.csvs("time_s,x_mm,z_mm", FOOT), any_path, 16, 0.1),
-    "forces": Law(FORCE, inputs.csvs("time_s,x_N,z_N", FORCE), any_force, 25, 0.05),
-    "baselines": Law(BASELINE, inputs.jsons(BASELINE), any_baseline, 36, 0.05),
+    "scenarios": Law(ELLIPSE.encode(), inputs.scenarios(), any_scenario, 16, 0.35),
+    "settings": Law(["leg.L2=0.065"], inputs.settings(), any_settings, 14, 0.15),
+    "legs": Law(b"L1 = 0.045", LEGS, any_leg, 12, 0.1),
+    "servos": Law(b"kp = 6.0", SERVOS, any_servo, 12, 0.1),
+    "paths": Law(FOOT, inputs.csvs("time_s,x_mm,z_mm", FOOT), any_path, 9, 0.1),
+    "forces": Law(FORCE, inputs.csvs("time_s,x_N,z_N", FORCE), any_force, 14, 0.05),
+    "baselines": Law(BASELINE, inputs.jsons(BASELINE), any_baseline, 18, 0.05),
 }
 
 
