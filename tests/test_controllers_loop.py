@@ -143,7 +143,7 @@ def test_leg_without_weight_floats() -> None:
     ends = []
     for law in (free, drag):
         torque = law_of(EXTENDED, law, keep(EXTENDED, theta))
-        motion = dynamics.simulate(EXTENDED, theta, (2.0, -1.0), 1e-4, 500, torque, every=50)
+        motion = dynamics.simulate(EXTENDED, theta, (2.0, -1.0), 1e-4, 250, torque, every=50)
         ends.append(dynamics.energy(EXTENDED, motion.theta, motion.theta_dot).kinetic)
     np.testing.assert_allclose(ends[0], np.broadcast_to(ends[0][0], ends[0].shape), rtol=1e-9)
     assert np.all(np.diff(ends[1], axis=0) < 0.0)
@@ -225,7 +225,7 @@ def test_mass_error_leaves_a_bounded_error() -> None:
     ideal, heavy, light = (
         misses(
             CLASSIC,
-            sampled(CLASSIC, ComputedTorque(mass_error=e), path, path(0.0).theta, 0.5),
+            sampled(CLASSIC, ComputedTorque(mass_error=e), path, path(0.0).theta, 0.4),
             path,
         )
         for e in (0.0, 0.2, -0.2)

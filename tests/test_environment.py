@@ -105,7 +105,7 @@ def test_all_is_as_in_gymnasium(kind: str, action: str) -> None:
     step = env.reset()
     observation, _ = other.reset(seed=5)
     random = np.random.default_rng(1)
-    for _ in range(60):
+    for _ in range(45):
         chosen = random.uniform(other.episodes.low, other.episodes.high)
         over = step.last()
         step = env.step(chosen)

@@ -54,7 +54,7 @@ def tracking_rms(motion: Motion, start: float) -> float:
 
 @LEGS
 def test_loop_stays_closed_in_its_assembly(leg: Leg) -> None:
-    motion = simulate(leg, AHEAD, ELLIPSE, 0.5)
+    motion = simulate(leg, AHEAD, ELLIPSE, 0.3)
     for psi, psi_dot in zip(motion.psi.tolist(), motion.psi_dot.tolist(), strict=True):
         point = oracle.loop(leg, psi)
         assert abs(oracle.position(point)) < 1e-15  # no integration error: closed in every state

@@ -12,6 +12,7 @@ import tomli_w
 from shipped import NAMES, shortened
 
 from fivebar_sim import rollout
+from fivebar_sim.control import Setpoints
 from fivebar_sim.control.servo import Servo
 from fivebar_sim.errors import ConfigError
 from fivebar_sim.files import resources
@@ -171,6 +172,8 @@ def test_resolved_table_gives_the_same_run(tmp_path: Path, name: str) -> None:
         assert Path(again.path.file) == folder / str(copied_name(first.path))
         again = msgspec.structs.replace(again, path=first.path)
     assert again == first
+    if not isinstance(first.controller, Setpoints):
+        return  # as long as ten others; test_record.py runs one of them again
     one = rollout.run(first)
     two = rollout.run(Scenario.load(folder / "scenario.toml"))
     for column in one.record:

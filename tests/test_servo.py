@@ -52,8 +52,8 @@ CLIPS = {"plain clipped", "line clipped", "clipped with friction"}
 
 
 def commands(servo: Servo, drive: Drive) -> tuple[Array, Array]:
-    """Return the start pose and commands of 0.5 s: an ellipse of 2 Hz, or torques that swing."""
-    wanted = motion.plan(LEG, PATH, 500, H)
+    """Return the start pose and commands of 0.3 s: an ellipse of 2 Hz, or torques that swing."""
+    wanted = motion.plan(LEG, PATH, 300, H)
     theta = wanted.q[:, MOTORS]
     if drive == "position":
         return wanted.q[0], theta[1:] + servo.damping / servo.kp * np.diff(theta, axis=0) / H

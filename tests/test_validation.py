@@ -156,7 +156,7 @@ def test_landing_from_half_a_metre_does_not_flip(preset: str) -> None:
     assert result.verdict == "not judged"
 
 
-@pytest.mark.parametrize("up", [-1.0, 1.0])
+@pytest.mark.parametrize("up", [-1.0, pytest.param(1.0, marks=pytest.mark.long)])
 @pytest.mark.parametrize("preset", stance.HANGING)
 def test_stiff_servos_hold_the_assembly(preset: str, up: float) -> None:
     """But one place of 30 in `extended`, far above the hip, half a degree from the stop at C."""
