@@ -16,6 +16,8 @@ agree: then the step is taken with the constant torques that it ends with.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cache
+from itertools import product
 from typing import NamedTuple
 
 import mujoco
@@ -32,17 +34,29 @@ SLACK = 1e-9
 UNLIMITED = 1e300
 """Stands for no limit beside legs that have one [N m]: not infinite, so that 0 times it is 0."""
 
-MODES = np.array([(a, e) for a in (0, 1, -1) for e in (0, 1, -1)])
-"""Every pair of modes of A and E, (9, 2)."""
+MOST_MODES = 9
+"""Modes of the motors of one leg; so many are tried of more motors, too."""
+
+
+@cache
+def modes_of(motors: int) -> Integers:
+    """Return every combination of the modes of some motors, (3^motors, motors)."""
+    return np.array(list(product((0, 1, -1), repeat=motors)))
+
+
+def motors_of(model: mujoco.MjModel) -> int:
+    """Return the number of motors of a model: its last actuators, which act on joints."""
+    joint = mujoco.mjtTrn.mjTRN_JOINT
+    return int((model.actuator_trntype == joint).sum())
 
 
 class Clipping(NamedTuple):
     """Position servos with torque limits.
 
     Attributes:
-        kp: Gains on the angle [N m/rad], (n, 1, 2).
-        kd: Gains on the rate, within what the limit clips [N m s/rad], (n, 1, 2).
-        limit: Largest torques [N m], (n, 1, 2).
+        kp: Gains on the angle [N m/rad], (n, 1, motors).
+        kd: Gains on the rate, within what the limit clips [N m s/rad], (n, 1, motors).
+        limit: Largest torques [N m], (n, 1, motors).
         late: Whether the spring acts at the end of a step, not at its start, (n, 1, 1).
     """
 
@@ -54,47 +68,53 @@ class Clipping(NamedTuple):
     @classmethod
     def of(cls, models: Sequence[mujoco.MjModel]) -> Clipping | None:
         """Return the servos of some models; None if no limit of theirs needs a look."""
-        # The motors are a model's last two actuators; a bare motor has no term in q and v.
-        springs = np.array([built.actuator_biasprm[-2:, 1] != 0.0 for built in models])
-        limited = springs & np.array([built.actuator_forcelimited[-2:] != 0 for built in models])
+        own = slice(-motors_of(models[0]), None)
+        # A bare motor has no term in q and v.
+        springs = np.array([built.actuator_biasprm[own, 1] != 0.0 for built in models])
+        limited = springs & np.array([built.actuator_forcelimited[own] != 0 for built in models])
         if not limited.any():
             return None
 
-        kp = np.array([built.actuator_gainprm[-2:, 0] for built in models])
-        kd = np.array([-built.actuator_biasprm[-2:, 2] for built in models])
-        most = np.array([built.actuator_forcerange[-2:, 1] for built in models])
+        kp = np.array([built.actuator_gainprm[own, 0] for built in models])
+        kd = np.array([-built.actuator_biasprm[own, 2] for built in models])
+        most = np.array([built.actuator_forcerange[own, 1] for built in models])
         limit = np.where(limited, most, UNLIMITED)
         discrete = mujoco.mjtIntegrator.mjINT_DISCRETE
         late = np.array([built.opt.integrator == discrete for built in models])
         return cls(kp[:, None], kd[:, None], limit[:, None], late[:, None, None])
+
+    @property
+    def motors(self) -> int:
+        """The number of motors."""
+        return self.kp.shape[-1]
 
     def rows(self, ids: Integers) -> Clipping:
         """Return the servos of some simulations."""
         return Clipping(self.kp[ids], self.kd[ids], self.limit[ids], self.late[ids])
 
     def begun(self, u: Array, q: Array, v: Array) -> Integers:
-        """Return the modes that MuJoCo chooses with the states before steps, (n, N, 2)."""
+        """Return the modes that MuJoCo chooses with the states before steps, (n, N, motors)."""
         return sides(self.kp * (u - q) - self.kd * v, self.limit)
 
     def ended(self, modes: Integers, u: Array, q: Array, q_next: Array, v_next: Array) -> Integers:
-        """Return the modes that the states after steps in some modes call for, (n, N, 2)."""
+        """Return the modes that the states after steps in some modes call for, (n, N, motors)."""
         asked = self.asked(u, q, q_next, v_next)
         # On the limit, to rounding, both modes give the same torque: the present one stays.
         return sides(asked + SLACK * modes * self.limit, (1.0 + SLACK * (modes == 0)) * self.limit)
 
     def asked(self, u: Array, q: Array, q_next: Array, v_next: Array) -> Array:
-        """Return the torques that steps end with before a limit clips them [N m], (n, N, 2)."""
+        """Return what steps end with before a limit clips it [N m], (n, N, motors)."""
         return self.kp * (u - np.where(self.late, q_next, q)) - self.kd * v_next
 
     def constant(self, torque: Array, q: Array, v: Array) -> Array:
-        """Return what `forced` does, for constant torques [N m], (n, N, 2)."""
+        """Return what `forced` does, for constant torques [N m], (n, N, motors)."""
         full = np.ones(torque.shape, dtype=np.int64)
         forced = self.forced(full, q, q, v)
-        forced[..., 2:] = torque - self.limit
+        forced[..., self.motors :] = torque - self.limit
         return forced
 
     def forced(self, modes: Integers, u: Array, q: Array, v: Array) -> Array:
-        """Return commands and joint torques for steps in these modes, (n, N, 4).
+        """Return commands and joint torques for steps in these modes, (n, N, 2 motors).
 
         In mode 0 a step begins without torque; what its command then lacks comes as a joint torque,
         which MuJoCo does not clip.
@@ -106,14 +126,15 @@ class Clipping(NamedTuple):
 
 
 def clipped(offset: Array, slope: Array, limit: Array) -> Array:
-    """Return the torques t = clip(offset + slope t, limit), or what comes nearest, (2,)."""
-    best = np.zeros(2)
+    """Return the torques t = clip(offset + slope t, limit), or what comes nearest, (motors,)."""
+    eye = np.eye(len(offset))
+    best = np.zeros(len(offset))
     least = np.inf
-    for mode in MODES:
+    for mode in modes_of(len(offset)):
         free = mode == 0
         torque = mode * limit
         # t - slope t = offset in the free rows, with the others on their limits.
-        system = (np.eye(2) - slope)[np.ix_(free, free)]
+        system = (eye - slope)[np.ix_(free, free)]
         torque[free] = np.linalg.solve(system, (offset + slope @ torque)[free])
         torque = np.clip(torque, -limit, limit)
         misses = np.abs(np.clip(offset + slope @ torque, -limit, limit) - torque).max()
@@ -129,5 +150,6 @@ def sides(asked: Array, limit: Array) -> Integers:
 
 
 def number(modes: Integers) -> Integers:
-    """Return which row of MODES a pair of modes is, (n,)."""
-    return modes[:, 0] % 3 * 3 + modes[:, 1] % 3
+    """Return which row of `modes_of` some modes are, (n,)."""
+    places = 3 ** np.arange(modes.shape[1])[::-1]
+    return modes % 3 @ places

@@ -20,7 +20,7 @@ import numpy as np
 from fivebar_sim.arrays import Bools
 
 RECORDED = "ground"
-"""The one sensor that is recorded."""
+"""The sensor that is recorded; those of a robot end with it, after the leg's name."""
 
 UPRIGHT = (1.0, 0.0, 0.0, 0.0)
 """The quaternion of what is not turned."""
@@ -70,7 +70,7 @@ def _short(model: mujoco.MjModel, *, forces: bool) -> mujoco.MjModel:
 def left_out(model: mujoco.MjModel, *, forces: bool = True) -> int:
     """Return the flags of what MuJoCo can leave out of a leg's steps, bit by bit the same.
 
-    Always the search for islands, since the loop makes one of the leg, and the one for pairs within
+    Always the search for islands, since the loop makes one of a leg, and the one for pairs within
     bodies, of which one geom collides. The sensors if none is recorded; contacts if nothing can
     touch; friction and springs of joints where there are none.
     """
@@ -91,9 +91,22 @@ def left_out(model: mujoco.MjModel, *, forces: bool = True) -> int:
 
 def _recorded(model: mujoco.MjModel) -> Bools:
     """Return which sensors are recorded, (nsensor,)."""
-    return np.arange(model.nsensor) == mujoco.mj_name2id(
-        model, mujoco.mjtObj.mjOBJ_SENSOR, RECORDED
-    )
+    names = [model.sensor(i).name for i in range(model.nsensor)]
+    return np.array([name.split("_")[-1] == RECORDED for name in names], dtype=bool)
+
+
+def recorded_columns(model: mujoco.MjModel) -> list[int]:
+    """Return where sensordata has the floor's forces on the feet.
+
+    Of a leg alone x and z, since it moves in a plane; of each leg of a robot x, y and z.
+    """
+    columns = []
+    for i in np.flatnonzero(_recorded(model)):
+        # Before the force is a number that says whether there is any.
+        start = int(model.sensor_adr[i]) + 1
+        alone = model.sensor(i).name == RECORDED
+        columns += [start, start + 2] if alone else [start, start + 1, start + 2]
+    return columns
 
 
 def can_touch(model: mujoco.MjModel) -> bool:

@@ -10,8 +10,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fivebar_sim.arrays import Array, Bools
-from fivebar_sim.metrics.columns import MOTORS_FROM_END
-from fivebar_sim.simulation.clipping import MODES, SLACK, Clipping, Integers, clipped, number
+from fivebar_sim.simulation.clipping import (
+    MOST_MODES,
+    SLACK,
+    Clipping,
+    Integers,
+    clipped,
+    modes_of,
+    number,
+)
 
 INPUTS = mujoco.mjtState.mjSTATE_CTRL | mujoco.mjtState.mjSTATE_QFRC_APPLIED
 """What every step is given: commands, then forces on the joints."""
@@ -118,6 +125,9 @@ class _Part:
             WARMSTART: stepper.qacc_warmstart[ids],
         }
         self._nq = stepper.qpos.shape[1]
+        # The motors are the last actuators; A and E are every other of a leg's joints.
+        self._own = slice(-clipping.motors, None)
+        self._joints = slice(-2 * clipping.motors, None, 2)
 
     def take(self, ctrl: Array, most: Integers) -> None:
         """Take steps; of each simulation the first wrong one is taken again, and is the last.
@@ -126,7 +136,7 @@ class _Part:
             ctrl: Commands of the steps, (n, N, nu).
             most: How many of them are wanted, (n,).
         """
-        u = ctrl[..., -2:]
+        u = ctrl[..., self._own]
         everyone = np.arange(len(ctrl))
         self.rows = self._step(everyone, ctrl, np.zeros_like(u))
         q, v = self._motors(self._before())
@@ -162,14 +172,15 @@ class _Part:
             who: Which simulations.
             k: Their steps.
             ctrl: Commands, (m, nu).
-            begun: The modes that MuJoCo chose, in which the step is wrong, (m, 2).
-            modes: The modes to try first, (m, 2).
+            begun: The modes that MuJoCo chose, in which the step is wrong, (m, motors).
+            modes: The modes to try first, (m, motors).
         """
         clipping = self._clipping.rows(who)
         q, v = self._motors(self._before()[who, k, None])
-        u = ctrl[:, None, -2:]
+        u = ctrl[:, None, self._own]
         left = np.arange(len(who))
-        tried = np.zeros((len(who), len(MODES)), dtype=bool)
+        every = modes_of(clipping.motors)
+        tried = np.zeros((len(who), len(every)), dtype=bool)
         tried[left, number(begun)] = True
 
         while left.size:
@@ -179,7 +190,7 @@ class _Part:
             rows = self._again(who[left], k[left], ctrl[left], forced)
             asked = mine.ended(modes[:, None], u[left], q[left], *self._motors(rows[STATE]))[:, 0]
             wrong = (asked != modes).any(axis=-1)
-            hopeless = wrong & tried[left].all(axis=1)
+            hopeless = wrong & (tried[left].sum(axis=1) >= MOST_MODES)
             for i in left[hopeless].tolist():
                 self._settle(who[[i]], k[[i]], ctrl[[i]])
 
@@ -188,7 +199,7 @@ class _Part:
             modes = asked[wrong]
             # One that was tried already would be tried for ever: the first that was not is next.
             known = tried[left, number(modes)]
-            modes = np.where(known[:, None], MODES[tried[left].argmin(axis=1)], modes)
+            modes = np.where(known[:, None], every[tried[left].argmin(axis=1)], modes)
 
         self.stopped[who] = self._warns(who)
 
@@ -200,15 +211,15 @@ class _Part:
 
         def asked(torque: Array) -> Array:
             rows = self._again(one, k, ctrl, clipping.constant(torque[None, None], q, v))
-            return clipping.asked(ctrl[:, None, -2:], q, *self._motors(rows[STATE]))[0, 0]
+            return clipping.asked(ctrl[:, None, self._own], q, *self._motors(rows[STATE]))[0, 0]
 
-        torque = np.zeros(2)
+        torque = np.zeros(clipping.motors)
         for _ in range(TRIES):
             now = asked(torque)
             if (np.abs(np.clip(now, -limit, limit) - torque) <= SLACK * limit).all():
                 return
-            slope = np.empty((2, 2))
-            for motor in range(2):
+            slope = np.empty((clipping.motors, clipping.motors))
+            for motor in range(clipping.motors):
                 other = torque.copy()
                 other[motor] -= np.copysign(0.1 * limit[motor], torque[motor])
                 slope[:, motor] = (asked(other) - now) / (other - torque)[motor]
@@ -219,8 +230,10 @@ class _Part:
     def _again(self, who: Integers, k: Integers, ctrl: Array, forced: Array) -> dict[Any, Array]:
         """Take step k of some simulations again, (m,), keep and return what is recorded."""
         self._put_back(who, k)
-        sent = np.concatenate([ctrl[:, None, :-2], forced[..., :2]], axis=-1)
-        rows = self._step(who, sent, forced[..., 2:])
+        motors = self._clipping.motors
+        pushes = ctrl[:, None, : ctrl.shape[-1] - motors]
+        sent = np.concatenate([pushes, forced[..., :motors]], axis=-1)
+        rows = self._step(who, sent, forced[..., motors:])
         for item, each in rows.items():
             self.rows[item][who, k] = each[:, 0]
         return rows
@@ -230,15 +243,15 @@ class _Part:
         return np.concatenate([self._start[STATE][:, None], self.rows[STATE][:, :-1]], axis=1)
 
     def _motors(self, state: Array) -> tuple[Array, Array]:
-        """Return motor angles and rates in some states, (..., 2) each."""
+        """Return motor angles and rates in some states, (..., motors) each."""
         qpos = state[..., 1 : 1 + self._nq]
         qvel = state[..., 1 + self._nq :]
-        return qpos[..., MOTORS_FROM_END], qvel[..., MOTORS_FROM_END]
+        return qpos[..., self._joints], qvel[..., self._joints]
 
     def _step(self, who: Integers, ctrl: Array, lacks: Array) -> dict[Any, Array]:
-        """Return what is recorded of steps with torques on top at A and E, (m, N, 2)."""
+        """Return what is recorded of steps with torques on top at the motors, (m, N, motors)."""
         forces = np.zeros((*ctrl.shape[:2], self._start[WARMSTART].shape[-1]))
-        forces[..., MOTORS_FROM_END] = lacks
+        forces[..., self._joints] = lacks
         given = np.concatenate([ctrl, forces], axis=-1)
         ids = self._ids[who]
         return self._stepper.rollout(ctrl.shape[1], given, int(INPUTS), self._record, ids)

@@ -15,7 +15,7 @@ from fivebar_sim.errors import ArgumentError, DivergedError
 from fivebar_sim.kinematics.stops import SPEED_LIMIT
 from fivebar_sim.model import without_log
 from fivebar_sim.simulation.clipping import Clipping
-from fivebar_sim.simulation.lean import RECORDED, lean, without_clock
+from fivebar_sim.simulation.lean import lean, recorded_columns, without_clock
 from fivebar_sim.simulation.limited import STATE, rollout
 
 STEP = ("qfrc_constraint", "solver_niter")
@@ -40,7 +40,7 @@ class States(NamedTuple):
         qvel: [rad/s], (nsim, N, nv).
         ctrl: The commands of the step, (nsim, N, nu).
         ground: Force (x, z) of the ground on the foot during the step [N], (nsim, N, 2); without a
-            ground (nsim, N, 0).
+            ground (nsim, N, 0); of a robot (x, y, z) on each foot, (nsim, N, 12).
         constraint: Joint forces of all constraints during the step [N m] (hinges), (nsim, N, nv).
         iterations: Of the constraint solver in the step, (nsim, N).
         warnings: MuJoCo's warnings of each simulation so far, (nsim,).
@@ -105,9 +105,7 @@ class Legs:
         self._ctrl = self._batch.bind("ctrl")
         self._clipping = Clipping.of(stepped * len(qpos) if shared else stepped)
         self._sizes = first.nq, first.nv, first.nu
-
-        ground = mujoco.mj_name2id(first, mujoco.mjtObj.mjOBJ_SENSOR, RECORDED)
-        self._ground = None if ground < 0 else int(first.sensor_adr[ground]) + 1  # after "found"
+        self._ground = recorded_columns(first)
 
     def advance(self, ctrl: Array) -> States:
         """Return the states of the next steps.
@@ -118,7 +116,7 @@ class Legs:
         Raises:
             ArgumentError: Commands of another shape, or that are not finite.
         """
-        record = (STATE, *STEP) if self._ground is None else (STATE, *STEP, "sensordata")
+        record = (STATE, *STEP, "sensordata") if self._ground else (STATE, *STEP)
         out = self._taken(ctrl, record)
         # A step that keeps a torque limit may have been sent another command.
         arrays = [out[STATE], *(out[name] for name in record[1:])]
@@ -159,8 +157,7 @@ class Legs:
         state, constraint, iterations, *sensors = arrays
         # The state begins with the time, then come qpos and qvel.
         nq, nv, _ = self._sizes
-        start = self._ground
-        ground = state[..., :0] if start is None else sensors[0][..., [start, start + 2]]
+        ground = sensors[0][..., self._ground] if self._ground else state[..., :0]
         return States(
             time=state[..., 0],
             qpos=state[..., 1 : 1 + nq],
@@ -188,7 +185,7 @@ class Legs:
         They are those of the simulations themselves, and change with every step. The state ends
         with the commands.
         """
-        names = STEP if self._ground is None else (*STEP, "sensordata")
+        names = (*STEP, "sensordata") if self._ground else STEP
         # The parts of the state come in the order of their bits.
         command = mujoco.mjtState.mjSTATE_CTRL.value
         before = mujoco.mjtState.mjSTATE_INTEGRATION.value & (2 * command - 1)
