@@ -194,7 +194,7 @@ MODEL = (
     Fault("rail that ends in the stance", TROT, built(ended_rail)),
     Fault("floor half as stiff", "rail-landing", built(scaled("geom_solref", 2.0))),
     Fault("drop left out", "rail-landing", around(planning, "_above_ground", on_the_floor)),
-    Fault("commands a step late", ELLIPSE, around(planning, "_setpoints", a_step_late)),
+    Fault("commands a step late", ELLIPSE, around(planning, "sent_setpoints", a_step_late)),
     Fault("motors swapped", ELLIPSE, commanded(swapped)),
     Fault("commands 0.1 % large", "payload-ellipse", commanded(lambda ctrl: 1.001 * ctrl)),
     Fault(

@@ -25,6 +25,7 @@ LEVELS = (
     "robots",
     "model",
     "render simulation",
+    "walking",
     "recording tasks",
     "runs environment gym",
     "rollout report vector",

@@ -40,13 +40,18 @@ class Gait(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
         _check_legs("phases", self.phases)
         _check_legs("strides", self.strides or dict.fromkeys(LEGS, 1.0))
 
+    @property
+    def period(self) -> float:
+        """Time after which every foot repeats [s]."""
+        return float(self.path.period or 0.0)
+
     def paths(self, robot: Robot) -> dict[str, FootPath]:
         """Return the path of each foot in its own hip frame.
 
         Each starts from rest within the ramp of the gait's path, where the leg's phase begins.
         """
         # Past the ramp the path is what it is for good, at its own time.
-        time = np.linspace(0.0, float(self.path.period or 0.0), SAMPLES)
+        time = np.linspace(0.0, self.period, SAMPLES)
         x = self.path.nominal(time).position[:, 0]
         middle = 0.5 * float(x.min() + x.max())
         strides = self.strides or dict.fromkeys(LEGS, 1.0)

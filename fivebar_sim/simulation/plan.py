@@ -109,8 +109,8 @@ def _complete(scenario: Scenario, wanted: Motion) -> Plan:
         integrator=sim.integrator,
         drive=controller.drive if asked else "position",
     )
-    table = None if asked else _asked(scenario, controller, wanted)
-    setpoints = None if table is None else _sent(scenario, table, wanted)
+    table = None if asked else asked_setpoints(scenario, controller, wanted)
+    setpoints = None if table is None else sent_setpoints(scenario, table, wanted)
     planned = Plan(scenario, wanted, built, start, pushes, setpoints, table)
 
     # Called for its check alone: a bad period is refused now, not during the run.
@@ -134,7 +134,7 @@ def _above_ground(scenario: Scenario, scene: Ground, q: Array) -> Array:
     return np.array([height, *q])
 
 
-def _asked(scenario: Scenario, controller: Setpoints, wanted: Motion) -> Array:
+def asked_setpoints(scenario: Scenario, controller: Setpoints, wanted: Motion) -> Array:
     """Return the setpoints that the scenario's controller plans, checked [rad], (N, 2)."""
     name = scenario.controller_name
     shape = (scenario.steps, 2)
@@ -150,7 +150,7 @@ def _asked(scenario: Scenario, controller: Setpoints, wanted: Motion) -> Array:
     return ctrl.astype(np.float64)
 
 
-def _sent(scenario: Scenario, asked: Array, wanted: Motion) -> Array:
+def sent_setpoints(scenario: Scenario, asked: Array, wanted: Motion) -> Array:
     """Return the setpoints that reach the motors in every step [rad], (N, 2)."""
     bus = Bus([scenario.servo], "position", timestep=scenario.sim.timestep, steps=scenario.steps)
     # Until the first setpoint arrives the servos hold the start pose.
