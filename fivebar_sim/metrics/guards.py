@@ -25,13 +25,10 @@ from fivebar_sim.geometry import FiveBar
 from fivebar_sim.kinematics.stops import Ranges, beyond
 from fivebar_sim.metrics import ground
 from fivebar_sim.metrics.branch import Branch
-from fivebar_sim.metrics.columns import JOINT_COLUMNS, motors, side_by_side
+from fivebar_sim.metrics.columns import JOINT_COLUMNS, side_by_side
 from fivebar_sim.metrics.energy import Balance
 from fivebar_sim.metrics.json_types import LARGEST, Amount, Number, Table
 from fivebar_sim.metrics.lasting import chattering, clipped
-
-FAINTEST = 1e-9
-"""Torque below which nothing counts as a jolt [N m]."""
 
 DEGREES = float(np.degrees(1.0))
 """Of a radian."""
@@ -81,11 +78,10 @@ class Guards(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
 
     def __post_init__(self) -> None:
         for part in self.__struct_fields__:
-            # Of a second; all others have no upper bound.
+            unit = "N" if part == "rail" else ""
+            # Parts of a second; all others have no upper bound.
             high = 1.0 if part in ("torque", "chatter") else math.inf
-            check_number(
-                part, getattr(self, part), "N" if part == "rail" else "", low=0.0, high=high
-            )
+            check_number(part, getattr(self, part), unit, low=0.0, high=high)
 
 
 class Guard(Table, frozen=True):
@@ -148,7 +144,8 @@ class Evidence(NamedTuple):
         growth: Decades by which errors of the feedback would have grown by each step if commands
             were held as long as a motor holds them, and which the timestep hides, (N,); None
             without feedback.
-        jolts: Torque of A and E that lasts a single step [N m], (N, 2); None in torque drive.
+        jolts: Torque that lasts a single step, as a part of the run's largest, (N,); None in torque
+            drive.
     """
 
     bounds: Guards
@@ -271,11 +268,7 @@ def _unstable(run: Evidence) -> Found | None:
 
 
 def _jolted(run: Evidence) -> Found | None:
-    if run.jolts is None:
-        return None
-    # Where nothing moves and nothing weighs, all torque is rounding.
-    largest = max(float(np.abs(motors(run.record, "torque")).max()), FAINTEST)
-    return _highest(run, run.jolts.max(axis=1) / largest, run.bounds.jolts)
+    return None if run.jolts is None else _highest(run, run.jolts, run.bounds.jolts)
 
 
 def _in_floor(run: Evidence) -> Found | None:

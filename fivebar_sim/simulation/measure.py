@@ -55,8 +55,8 @@ class Unrecorded(NamedTuple):
         trunk: Height of the trunk's lowest point above the hip frame's origin [m].
         growth: Decades by which errors of the feedback would have grown by each step, unseen,
             (N,); None without feedback. See `sampling.Stability.hidden`.
-        jolts: Torque of A and E that lasts a single step [N m], (N, 2); None in torque drive, where
-            a torque lasts as long as the controller's period.
+        jolts: Torque that lasts a single step, as a part of the run's largest, (N,); None in torque
+            drive, where a torque lasts as long as the controller's period.
     """
 
     steps: energy.Steps
