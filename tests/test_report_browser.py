@@ -43,6 +43,10 @@ TOO_WIDE = """() => {
         .map(table => [table.caption.textContent, table.scrollWidth]);
 }"""
 
+SQUEEZED = """() => [...document.querySelectorAll('caption')]
+    .filter(caption => caption.getBoundingClientRect().width < 100)
+    .map(caption => caption.textContent)"""
+
 SEEN = """selector => {
     const style = getComputedStyle(document.querySelector(selector));
     return [style.color, style.stroke, style.backgroundColor];
@@ -110,6 +114,7 @@ def test_page_is_alone_drawn_and_fits(
         page.set_viewport_size({"width": width, "height": 800})
         assert page.evaluate("document.documentElement.scrollWidth") <= width
         assert page.evaluate(TOO_WIDE) == []
+        assert page.evaluate(SQUEEZED) == []
         figures = page.evaluate(FIGURES)
         assert len(figures) == (12 if which == "one" else 6)
         for figure in figures:

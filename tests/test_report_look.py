@@ -133,6 +133,15 @@ def test_only_long_lines_of_a_table_wrap() -> None:
     assert re.findall(r'<td class="(\w+)"', table) == ["number", "number", "words", "number"]
 
 
+def test_no_line_ends_within_a_number_and_its_unit() -> None:
+    cells = ["17.9 to 19.8 mN m", "543.5 mN m at 0.009 s", "25 to 27.5 deg C", "0.5 mm mobile"]
+    table = html.table("", ["", *"1234"], [["of 5 mN m", *cells]])
+    assert "17.9 to 19.8&nbsp;mN&nbsp;m<" in table
+    assert "543.5&nbsp;mN&nbsp;m at 0.009&nbsp;s<" in table
+    assert "25 to 27.5&nbsp;deg&nbsp;C<" in table
+    assert "0.5&nbsp;mm mobile" in table
+
+
 def test_plain_values() -> None:
     values = [True, None, 0.123456789, [1, 2.0], [], "a"]
     assert [html.plain(v) for v in values] == ["yes", "none", "0.12346", "1, 2", "none", "a"]

@@ -10,6 +10,7 @@ from importlib.metadata import version
 from fivebar_sim.metrics.measured import NOT_JUDGED, Verdict
 from fivebar_sim.report import look
 from fivebar_sim.report.draw import Drawn
+from fivebar_sim.units import LADDERS
 
 POLICY = "default-src 'none'; style-src 'unsafe-inline'; img-src data:"
 """What the browser may load: nothing."""
@@ -55,7 +56,8 @@ tbody th { min-width: 6.5rem; }
 @media (max-width: 40rem) {
   table { font-size: .8rem; }
   th, td { padding-right: .4rem; }
-  .stacked, .stacked thead, .stacked tbody { display: block; }
+  pre { white-space: pre-wrap; overflow-wrap: anywhere; }
+  .stacked, .stacked caption, .stacked thead, .stacked tbody { display: block; }
   .stacked tr { display: grid; border-bottom: 1px solid var(--grid);
     grid-template-columns: repeat(var(--values), minmax(0, 1fr)); }
   .stacked th, .stacked td { border: 0; text-align: left; white-space: normal;
@@ -74,6 +76,15 @@ tbody th { min-width: 6.5rem; }
 
 LONGEST = 16
 """Letters of a value that never goes over two lines, as numbers with a unit do."""
+
+
+UNITS = {name for ladder in LADDERS for name in ladder} | {"%", "deg", "deg C"}
+"""The units that numbers are shown in."""
+
+NUMBER_AND_UNIT = re.compile(
+    r"(?<=\d) (?:" + "|".join(map(re.escape, sorted(UNITS, key=len, reverse=True))) + r")(?![\w/])"
+)
+"""The blank after a number, and its unit; the longest unit first: "mN m" is not "mN"."""
 
 
 class Cell(str):
@@ -157,7 +168,7 @@ def table(
     )
     body = "\n".join(
         f'<tr><th scope="row">{text(row[0])}</th>'
-        + "".join(f"<td{_class(cell)}>{text(cell)}</td>" for cell in row[1:])
+        + "".join(f"<td{_class(cell)}>{_units_kept(text(cell))}</td>" for cell in row[1:])
         + "</tr>"
         for row in rows
     )
@@ -176,6 +187,11 @@ def _class(cell: object) -> str:
     # What is small stands on a line of its own.
     lines = [unescape(re.sub(r"<[^>]*>", "", line)) for line in text(cell).split("<small>")]
     return ' class="number"' if max(map(len, lines)) <= LONGEST else ' class="words"'
+
+
+def _units_kept(cell: Cell) -> Cell:
+    """Return a cell in which no line ends between a number and its unit, or within a unit."""
+    return Cell(NUMBER_AND_UNIT.sub(lambda found: found[0].replace(" ", "&nbsp;"), cell))
 
 
 def key(name: str) -> Cell:

@@ -74,8 +74,11 @@ def _time_bar(figure: Figure, ax: Axes, time: Array) -> None:
     """Draw the time scale of the colours below the path."""
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import BoundaryNorm, ListedColormap
+    from matplotlib.ticker import MaxNLocator
 
-    edges = np.linspace(0.0, float(time[-1]), PIECES + 1)
+    end = float(time[-1])
+    edges = np.linspace(0.0, end, PIECES + 1)
+    ticks = np.asarray(MaxNLocator(5).tick_values(0.0, end))
     tints = ListedColormap(draw.time_colours(PIECES))
     bar = figure.colorbar(
         ScalarMappable(BoundaryNorm(edges, PIECES), tints),
@@ -84,7 +87,8 @@ def _time_bar(figure: Figure, ax: Axes, time: Array) -> None:
         label="time [s]",
         fraction=0.06,
         aspect=40,
-        ticks=np.linspace(0.0, float(time[-1]), 5),
+        # 1e-9: the last tick is rounded.
+        ticks=ticks[ticks <= end * (1.0 + 1e-9)],
         format="%.3g",
     )
     # Vectors stay sharp at any size, unlike a bitmap; edges of the same colour close the hairlines

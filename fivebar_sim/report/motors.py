@@ -10,6 +10,7 @@ from fivebar_sim import units
 from fivebar_sim.arrays import Array
 from fivebar_sim.metrics.catalogue import shown
 from fivebar_sim.metrics.columns import MOTORS
+from fivebar_sim.metrics.columns import motors as columns
 from fivebar_sim.metrics.limits import look_up
 from fivebar_sim.report import axes, draw, numbers
 from fivebar_sim.report.draw import Drawn
@@ -92,30 +93,31 @@ def torque_speed(run: StoredRun) -> Drawn:
     figure = Figure(figsize=(WIDTH, 2.9), layout="constrained")
     ax = figure.add_subplot()
     window = run.scenario.window
-    fastest = 0.0
-    largest = 0.0
+    fastest, largest = (
+        float(np.abs(columns(run.record, name)[window]).max()) for name in ("theta_dot", "torque")
+    )
+    _, unit = units.fitting(1e3 * largest, "mN m")
     for motor in MOTORS:
         speed = run.record[f"theta_dot_{motor}"][window]
-        torque = 1e3 * run.record[f"torque_{motor}"][window]
+        torque = run.record[f"torque_{motor}"][window] / units.size(unit)
         rows = np.union1d(draw.envelope(speed), draw.envelope(torque))
         ax.plot(speed[rows], torque[rows], color=colour(motor), lw=1.2, label=f"motor {motor}")
-        fastest = max(fastest, float(np.abs(speed).max()))
-        largest = max(largest, float(np.abs(torque).max()))
 
     fastest = 1.1 * fastest or 1.0
-    note = _torque_speed_line(ax, run, fastest, 1e-3 * largest)
-    ax.set(xlabel="speed [rad/s]", ylabel="torque [mN m]", xlim=(-fastest, fastest))
+    note = _torque_speed_line(ax, run, fastest, largest, unit)
+    ax.set(xlabel="speed [rad/s]", ylabel=f"torque [{unit}]", xlim=(-fastest, fastest))
     figure.legend(loc="outside upper center", ncols=3)
     return Drawn(
         "torque-speed",
         "Torque against speed",
         f"Each motor's torque at its speed, in the measured time.{note}",
-        f"The motors' torque against their speed; at most {largest:.3g} mN m.{note}",
+        f"The motors' torque against their speed; at most "
+        f"{units.text(1e3 * largest, 'mN m', 3)}.{note}",
         figure,
     )
 
 
-def _torque_speed_line(ax: Axes, run: StoredRun, fastest: float, largest: float) -> str:
+def _torque_speed_line(ax: Axes, run: StoredRun, fastest: float, largest: float, unit: str) -> str:
     """Draw the torque that a servo has at each speed, if it is near; return a sentence about it."""
     limit = run.scenario.servo.limit
     if limit is None:
@@ -127,7 +129,7 @@ def _torque_speed_line(ax: Axes, run: StoredRun, fastest: float, largest: float)
     ends = np.array([-fastest, fastest])
     low, high = numbers.band_at(run, ends)
     for edge, label in ((low, None), (high, "servo's limit")):
-        ax.plot(ends, 1e3 * edge, "-.", color=colour("muted"), lw=1.2, label=label)
+        ax.plot(ends, edge / units.size(unit), "-.", color=colour("muted"), lw=1.2, label=label)
     return f" Dash-dotted: the most that the servo gives at each speed, {said}."
 
 

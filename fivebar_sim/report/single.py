@@ -8,6 +8,7 @@ from typing import Any
 import msgspec
 import tomli_w
 
+from fivebar_sim import units
 from fivebar_sim.checks import is_finite
 from fivebar_sim.metrics import guards, tracking
 from fivebar_sim.metrics.catalogue import BY_KEY, SHOWN, shown
@@ -19,6 +20,12 @@ from fivebar_sim.report.html import plain, text
 from fivebar_sim.runs.side_by_side import when
 from fivebar_sim.runs.stored import StoredRun
 from fivebar_sim.scenario.leg_words import leg_words
+
+TIMES = {
+    "load.opposing.first": "motors opposed first, after the window's begin",
+    "branch.first_flip": "first branch flip",
+}
+"""Times of metrics.json that are no metrics, and what happened then; None for never."""
 
 
 def figures(run: StoredRun) -> list[Drawn]:
@@ -204,6 +211,7 @@ def _metrics(run: StoredRun) -> str:
         "As in metrics.json, there in SI units; (run): over the whole run.",
         ("metric", "value", "SI", "key"),
         rows,
+        stacked=True,
     )
 
 
@@ -220,6 +228,9 @@ def _words(key: str, value: Any) -> tuple[str, str]:
         return f"{SHOWN[peak][0]}: when", f"{plain(value)} s"
     if key.startswith("window."):
         return f"window, {label}", f"{plain(value)} s"
+    if alike in TIMES:
+        label = TIMES[alike]
+        value = "never" if value is None else units.text(value, "s")
     return label + (", in stance" if alike != key else ""), plain(value)
 
 
