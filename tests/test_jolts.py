@@ -110,6 +110,16 @@ def test_torque_drive_has_no_such_guard() -> None:
     assert "jolts" not in {each.name for each in result.measured.guards}
 
 
+def test_corners_of_the_reference_count_where_a_controller_uses_its_accelerations() -> None:
+    """At 0.5 ms computed torque leaves its branch there: a corner has twice the acceleration."""
+    corner = ran("classic-ellipse", SHORT, *EDGE, "controller.name=computed_torque")
+    assert not guard(corner).ok
+    blind = ran("classic-ellipse", SHORT, *EDGE, "controller.name=pd")
+    assert (guard(blind).value, guard(blind).ok) == (0.0, True)
+    within = ("path.outside=nearest", "controller.name=computed_torque")
+    assert guard(ran("classic-ellipse", SHORT, *within)).value == pytest.approx(0.0, abs=0.01)
+
+
 @pytest.mark.parametrize("settings", [(), ("controller.feedforward=torque",), ("servo=xl330",)])
 def test_smooth_commands_pass(settings: tuple[str, ...]) -> None:
     found = guard(ran("classic-ellipse", SHORT, *settings))

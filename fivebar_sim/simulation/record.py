@@ -115,14 +115,20 @@ def jolts(planned: Plan, record: Record) -> Array | None:
     """Return the torque that lasts a single step, as a part of the run's largest, (N,).
 
     So does torque that should, but that the run does not show: what a bus makes of a jump by
-    chance, missing it or holding it for many steps, and what dies out within the step. None in
-    torque drive.
+    chance, missing it or holding it for many steps, and what dies out within the step. In torque
+    drive a torque lasts for a period: there only corners of the reference count, else it is None.
     """
-    if _drive(planned) == "torque":
+    torque = motors(record, "torque")
+    found = np.zeros_like(torque)
+    if _drive(planned) == "position":
+        found = lasting.lone(torque, np.zeros(2))
+
+    # The targets' own rates are those of a formula; those of projected ones are differences.
+    if planned.asked is None and planned.scenario.path.outside == "nearest":
+        found = np.maximum(found, _referred(planned))
+    elif _drive(planned) == "torque":
         return None
 
-    torque = motors(record, "torque")
-    found = lasting.lone(torque, np.zeros(2))
     sent = planned.setpoints
     asked = planned.asked
     if sent is not None and asked is not None and sent is not asked:
@@ -130,6 +136,24 @@ def jolts(planned: Plan, record: Record) -> Array | None:
         found = np.maximum(found, _missed(planned, sent, torque))
     largest = max(float(np.abs(torque).max()), FAINTEST)
     return found.max(axis=1) / largest
+
+
+def _referred(planned: Plan) -> Array:
+    """Return the torque for a single step that a feedback takes from its reference, (N, 2).
+
+    A corner of projected targets has such an acceleration; not every controller uses it.
+    """
+    wanted = planned.motion
+    theta, rate, acceleration = (
+        q[1:, MOTOR_JOINTS] for q in (wanted.q, wanted.q_dot, wanted.q_ddot)
+    )
+    leg = planned.scenario.leg
+    force = wanted.force[1:]
+    needed = dynamics.inverse(leg, theta, rate, acceleration, force, payload=wanted.payload)
+    found = lasting.lone(needed, np.zeros(2))
+    worst = int(np.argmax(found.max(axis=1)))
+    used = sampling.accelerated(planned.scenario, wanted, worst + 1)
+    return found if (2.0 * used > found[worst]).any() else np.zeros_like(found)
 
 
 def _fed(planned: Plan, asked: Array) -> Array:

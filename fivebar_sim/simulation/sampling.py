@@ -13,9 +13,10 @@ once with the run's own steps and once with much finer ones.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fivebar_sim import dynamics
 from fivebar_sim.arrays import Array, Bools
@@ -178,21 +179,48 @@ def _slopes(
     shown[4:] -= np.diag(change)
 
     seen = Observation(k * scenario.sim.timestep, shown[:, :2], shown[:, 2:])
-    answer = answer_of(
-        scenario.controller_name,
-        lambda: controller.command(scenario.leg, scenario.servo, seen, _reference(wanted, k)),
-    )
+    answer = _answer(scenario, controller, seen, _reference(wanted, k, 8))
     # Asked beside its own states it may answer what a run would refuse.
     if not is_numbers(answer, (8, 2)) or not np.isfinite(answer).all():
         raise FiveBarError("no answer close by")
     return ((answer[:4] - answer[4:]) / (2.0 * change[:, None])).T
 
 
-def _reference(wanted: Motion, k: int) -> Reference:
-    """Return the reference at step k, for eight legs at once."""
+def accelerated(scenario: Scenario, wanted: Motion, k: int) -> Array:
+    """Return what of a feedback's command at step k comes of the reference's accelerations, (2,).
+
+    In N m, with the leg in the wanted motion; 0 without feedback, or where it has no answer.
+    """
+    controller = scenario.controller
+    if not isinstance(controller, Feedback):
+        return np.zeros(2)
+    full = _reference(wanted, k, 1)
+    still = np.zeros((1, 2))
+    seen = Observation(k * scenario.sim.timestep, full.theta, full.theta_dot)
+    less = full._replace(foot_ddot=still, theta_ddot=still)
+    try:
+        change = _answer(scenario, controller, seen, full)[0]
+        change = change - _answer(scenario, controller, seen, less)[0]
+    except FiveBarError:
+        return np.zeros(2)
+    return np.abs(change) * (scenario.servo.kp if controller.drive == "position" else 1.0)
+
+
+def _answer(
+    scenario: Scenario, controller: Feedback, seen: Observation, wanted: Reference
+) -> NDArray[Any]:
+    """Return what a controller answers, of whatever kind."""
+    return answer_of(
+        scenario.controller_name,
+        lambda: controller.command(scenario.leg, scenario.servo, seen, wanted),
+    )
+
+
+def _reference(wanted: Motion, k: int, legs: int) -> Reference:
+    """Return the reference at step k, for some legs at once."""
     rows = [wanted.foot, wanted.foot_dot, wanted.foot_ddot]
     rows += [q[:, ::2] for q in (wanted.q, wanted.q_dot, wanted.q_ddot)]
-    fields = [np.tile(values[k], (8, 1)) for values in (*rows, wanted.force)]
+    fields = [np.tile(values[k], (legs, 1)) for values in (*rows, wanted.force)]
     return Reference(*fields, payload=wanted.payload)
 
 
