@@ -9,6 +9,7 @@ import numpy as np
 from fivebar_sim import motion
 from fivebar_sim.arrays import Array
 from fivebar_sim.control import Feedback
+from fivebar_sim.metrics import tracking
 from fivebar_sim.metrics.columns import MOTORS, motors
 from fivebar_sim.metrics.guards import Guard
 from fivebar_sim.scenario import Scenario
@@ -23,6 +24,12 @@ SPRUNG = 0.15
 
 DAMPED = 0.5
 """The same of a feedback controller: what it holds for long is less sensitive to it."""
+
+OPENED = 0.5
+"""Part of the tracking error that the loop's gap may be."""
+
+NOTHING = 1e-3
+"""Part of the leg's size that no gap is worth a word below."""
 
 FIRST = 10
 """Steps in which a run starts: what is held, and perhaps moves, sets in at once."""
@@ -45,6 +52,7 @@ def warnings(scenario: Scenario, record: Mapping[str, Array], guards: list[Guard
     found = (
         _jolted(guards),
         _started(scenario, record),
+        _opened(scenario, record),
         _sprung(scenario),
         _damped(scenario, record, guards),
     )
@@ -77,8 +85,21 @@ def _started(scenario: Scenario, record: Mapping[str, Array]) -> str | None:
     )
 
 
+def _opened(scenario: Scenario, record: Mapping[str, Array]) -> str | None:
+    """Return the warning that tracking is no better than the loop's gap."""
+    window = scenario.window
+    gap = tracking.gap_rms(scenario.leg, record, window)
+    error = tracking.rms(scenario.leg, record, window)
+    if not gap > max(OPENED * error, NOTHING * scenario.leg.size):
+        return None
+    return (
+        f"tracking depends on the timestep: the loop is open by {1e3 * gap:.3g} mm, of an error "
+        f"of {1e3 * error:.3g} mm; {CHECK}"
+    )
+
+
 def _sprung(scenario: Scenario) -> str | None:
-    """Return the warning that the step damps the servos' springs, which contacts load.
+    """Return the warning that the step damps the servos' springs, which jerks and contacts load.
 
     Under `discrete` a spring acts with the angle that a step ends in: as if kd were kp h larger.
     """
@@ -87,10 +108,11 @@ def _sprung(scenario: Scenario) -> str | None:
     if isinstance(scenario.controller, Feedback) or sim.integrator != "discrete":
         return None
     added = servo.kp * sim.timestep
-    if not isinstance(scenario.scene, Ground) or not added > SPRUNG * servo.damping:
+    jerked = isinstance(scenario.scene, Ground) or scenario.path.ramp == 0.0
+    if not jerked or not added > SPRUNG * servo.damping:
         return None
     return (
-        f"torques of impacts depend on the timestep: kp h = {added:.3g} N m s/rad adds to the "
+        f"torques of jerks depend on the timestep: kp h = {added:.3g} N m s/rad adds to the "
         f"servos' damping of {servo.damping:.3g} N m s/rad; {CHECK}"
     )
 
@@ -113,14 +135,15 @@ def _damped(scenario: Scenario, record: Mapping[str, Array], guards: list[Guard]
     if found is None:
         return None
 
-    dies_out = found.real < 0.0
-    if not dies_out.any():
+    settles = found.shown < 0.0
+    if not settles.any():
         return None
-    real = -float(np.median(found.real[dies_out]))
-    shown = -float(np.median(found.shown[dies_out]))
-    if not shown > (1.0 + DAMPED) * real:
+    real = float(np.median(found.real[settles]))
+    shown = float(np.median(found.shown[settles]))
+    if not -shown > (1.0 + DAMPED) * max(-real, 0.0):
         return None
+    really = "die out" if real < 0.0 else "grow"
     return (
-        f"the timestep damps the feedback: errors die out at {shown:.3g}/s, with shorter ones at "
-        f"{real:.3g}/s; {CHECK}"
+        f"the timestep damps the feedback: errors die out at {-shown:.3g}/s, with shorter ones "
+        f"they {really} at {abs(real):.3g}/s; {CHECK}"
     )
