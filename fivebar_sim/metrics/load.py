@@ -144,7 +144,8 @@ def moving_share(torque: Array, half: int) -> tuple[Array, Bools]:
         whose window a torque passes `TINY` of the largest of all rows, as for `share_A`.
     """
     amount = np.abs(torque)
-    real = (amount > TINY * amount.max()).any(axis=1)
+    above = amount > TINY * amount.max()
+    real = above[:, 0] | above[:, 1]
     k = np.arange(len(torque))
     low = np.maximum(k - half, 0)
     high = np.minimum(k + half + 1, len(torque))
@@ -214,7 +215,7 @@ def _over(steps: _Steps, chosen: Bools) -> Share:
         opposing=Opposing(
             fraction=float(steps.against[chosen].mean()),
             first=float(steps.timestep) * int(np.argmax(against)) if against.any() else None,
-            energy=float(np.abs(steps.work[against]).min(axis=1).sum()),
+            energy=float(np.minimum(*np.abs(steps.work[against]).T).sum()),
         ),
     )
 
@@ -249,8 +250,8 @@ def _against(work: Array) -> Bools:
     """Return in which steps one motor gives work and the other takes it, both more than `TINY`."""
     # Both must be real work: next to nothing has a sign too.
     amount = np.abs(work)
-    real = (amount > TINY * amount.max()).all(axis=1)
-    return real & (np.signbit(work[:, 0]) != np.signbit(work[:, 1]))
+    real = amount > TINY * amount.max()
+    return real[:, 0] & real[:, 1] & (np.signbit(work[:, 0]) != np.signbit(work[:, 1]))
 
 
 def _rms(tau: Array) -> Array:
