@@ -56,10 +56,12 @@ def price(leg: FiveBar, theta: Array, omega: Array, torque: Array) -> Price:
     Raises:
         FiveBarError: The serial leg does not reach a foot point, or a pose is open or singular.
     """
+    serial = serial_leg(leg)
+    chain = Chain.of(leg, None, 0.0)
     tau_s = np.empty_like(torque)
     omega_s = np.empty_like(omega)
     for rows in blocks(len(theta)):
-        tau_s[rows], omega_s[rows] = _serial(leg, theta[rows], omega[rows], torque[rows])
+        tau_s[rows], omega_s[rows] = _serial(serial, chain, theta[rows], omega[rows], torque[rows])
 
     return Price(
         heat=_ratio(torque**2, tau_s**2),
@@ -68,10 +70,11 @@ def price(leg: FiveBar, theta: Array, omega: Array, torque: Array) -> Price:
     )
 
 
-def _serial(leg: FiveBar, theta: Array, omega: Array, torque: Array) -> tuple[Array, Array]:
+def _serial(
+    serial: SerialLeg, chain: Chain, theta: Array, omega: Array, torque: Array
+) -> tuple[Array, Array]:
     """Return the serial leg's torques and rates, (N, 2); see `price`."""
-    serial = serial_leg(leg)
-    chain = Chain.of(leg, None, 0.0)
+    leg = chain.leg
     pose = chain.pose(theta[:, 0], theta[:, 1])
     AB = np.stack(pose.e1, axis=-1) * leg.L1
     BF = np.stack(placed(pose.e2, leg.foot_offset), axis=-1)

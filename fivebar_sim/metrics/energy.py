@@ -14,6 +14,8 @@ other torques, masses or constraints acted than the record says.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -72,7 +74,8 @@ class Steps(NamedTuple):
     force: Array
 
 
-class Balance(NamedTuple):
+@dataclass(frozen=True)
+class Balance:
     """The works of each step on the leg and its load, and the gains of energy [J], each (N,).
 
     Attributes:
@@ -98,13 +101,13 @@ class Balance(NamedTuple):
     moved: bool
     lift: float
 
-    @property
+    @cached_property
     def turnover(self) -> float:
         """Sum of the absolute works of motors, pushes, ground, constraints and gravity [J]."""
         acting = (self.motor, self.force, self.ground, self.constraints, self.potential)
         return float(np.sum(np.abs(acting)))
 
-    @property
+    @cached_property
     def unaccounted(self) -> Array:
         """Energy so far that no work accounts for [J], (N,)."""
         given = self.motor + self.force + self.ground + self.constraints + self.step
@@ -194,9 +197,10 @@ def balance(body: Body, record: Mapping[str, Array], steps: Steps) -> Balance:
     """
     leg = body.leg
     rows = len(record["time"])
+    chain = Chain.of(leg, None, body.payload)
     works = _Works(*np.empty((len(_Works._fields), rows)))
     for part in blocks(rows):
-        for whole, values in zip(works, _works(body, record, steps, part), strict=True):
+        for whole, values in zip(works, _works(body, chain, record, steps, part), strict=True):
             whole[part] = values
 
     return Balance(
@@ -206,14 +210,16 @@ def balance(body: Body, record: Mapping[str, Array], steps: Steps) -> Balance:
     )
 
 
-def _works(body: Body, record: Mapping[str, Array], steps: Steps, rows: slice) -> _Works:
+def _works(
+    body: Body, chain: Chain, record: Mapping[str, Array], steps: Steps, rows: slice
+) -> _Works:
     """Return the works of some steps, and what the energies gained; see `balance`."""
     leg = body.leg
     h = float(record["time"][0])
     m = _Motion.of(record, steps.start, rows)
     # Rates belong to the middle of the step that they moved the leg by; see above.
     middle = tuple(q - 0.5 * h * v for q, v in zip(m.q, m.v, strict=True))
-    kinetic, potential = _energies(body, middle, m.v, m.hip - 0.5 * h * m.hip_dot, m.hip_dot)
+    kinetic, potential = _energies(body, chain, middle, m.v, m.hip - 0.5 * h * m.hip_dot, m.hip_dot)
     pose = _open_pose(tuple(q[:-1] for q in m.q))
     x, z = _foot_rates(leg, pose, m.w[0], m.w[0] + m.w[1])
     none = np.zeros(len(m.lift))
@@ -238,7 +244,7 @@ def _works(body: Body, record: Mapping[str, Array], steps: Steps, rows: slice) -
         force=force,
         ground=ground,
         constraints=h * np.sum(steps.constraint[rows] * joints, axis=-1) - ground,
-        step=h * _given_away(body, m, pose),
+        step=h * _given_away(chain, m, pose),
         kinetic=np.diff(kinetic),
         potential=np.diff(potential),
     )
@@ -257,18 +263,17 @@ def _range(values: Array, start: float) -> float:
     return float(max(values.max(), start) - min(values.min(), start))
 
 
-def _given_away(body: Body, m: _Motion, p: Pose) -> Array:
+def _given_away(chain: Chain, m: _Motion, p: Pose) -> Array:
     """Return -(c(q, v) - c(q, w)) . w of every step [W], v the rates at its start, (N,).
 
     c is that of the links' own directions, and of the hip, which a link's moment r about its joint
     pushes down by r_z psi_dot^2.
 
     Args:
-        body: What moves.
+        chain: The leg's constants, payload included.
         m: Its motion.
         p: The poses before each step.
     """
-    chain = Chain.of(body.leg, None, body.payload)
     v = tuple(rate[:-1] for rate in _of_links(m.v))
     w = _of_links(m.w)
     still = (0.0, 0.0, 0.0, 0.0)
@@ -296,14 +301,14 @@ def mechanical(
         hip: Height of the hip frame [m], (...).
         hip_dot: Its rate [m/s], (...).
     """
-    return _energies(body, _columns(q), _columns(v), hip, hip_dot)
+    chain = Chain.of(body.leg, None, body.payload)
+    return _energies(body, chain, _columns(q), _columns(v), hip, hip_dot)
 
 
 def _energies(
-    body: Body, q: Joints, v: Joints, hip: Array | float, hip_dot: Array | float
+    body: Body, chain: Chain, q: Joints, v: Joints, hip: Array | float, hip_dot: Array | float
 ) -> tuple[Array, Array]:
     """Return what `mechanical` does, of each joint's angles and rates (...)."""
-    chain = Chain.of(body.leg, None, body.payload)
     p = _open_pose(q)
     w = _of_links(v)
     kinetic, potential = chain.energies(p, w)
