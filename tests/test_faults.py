@@ -1,7 +1,9 @@
 """Seeded faults: `fivebar check` of the shipped scenarios turns red for each, and for nothing else.
 
-The short form runs the one scenario that a fault names. The long form runs all of them for every
-fault, and prints who notices; it also looks for false alarms, under load and with other rounding.
+The short form runs the one scenario that a fault names, for its ramp and a period, against a
+baseline of the same run without it that has the shipped one's tolerances. The long form runs all of
+them whole for every fault, and prints who notices; it also looks for false alarms, under load and
+with other rounding.
 """
 
 from __future__ import annotations
@@ -11,6 +13,7 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import cache
 from operator import attrgetter
 from pathlib import Path
 
@@ -19,7 +22,7 @@ import pytest
 from faults import MODEL, Fault
 from faults_program import PROGRAM
 from shell import Shell
-from shipped import NAMES
+from shipped import NAMES, shortened
 
 from fivebar_sim import rollout
 from fivebar_sim.arrays import Array
@@ -35,14 +38,47 @@ FAULTS = (*MODEL, *PROGRAM)
 REFUSED = {"knees on the wrong side", "sign of theta_B"}
 """Faults that leave nothing to simulate: the path is refused, by name, with exit status 2."""
 
+WHOLE = REFUSED | {
+    *("half the timestep", "torque limit left out"),
+    *("delay of the servo ignored", "saturation not seen"),
+}
+"""Faults that the command is asked for, with the whole scenario: in a part of it none shows."""
+
 
 def test_faults_are_many_and_each_is_one() -> None:
     assert len({fault.what for fault in FAULTS}) == len(FAULTS) >= 25
     assert {fault.seen_by for fault in FAULTS} <= set(NAMES)
-    assert REFUSED <= {fault.what for fault in FAULTS}
+    assert WHOLE <= {fault.what for fault in FAULTS}
 
 
-@pytest.mark.parametrize("fault", FAULTS, ids=attrgetter("what"))
+def brief(name: str) -> Scenario:
+    """Return a scenario of its ramp and a period, without limits, which are for all of it."""
+    return Scenario.load(name, [f"duration={shortened(name).duration}", "limits={}"])
+
+
+@cache
+def without_fault(name: str) -> baseline.Baseline:
+    """Return the baseline of a brief run, with the shipped one's tolerances."""
+    shipped = baseline.read(baseline.place(name))
+    right = rollout.run(brief(name))
+    recorded = baseline.record(right.metrics, shipped)
+    assert shipped is not None
+    assert comparison.compare(right, recorded).failures == []
+    return recorded
+
+
+@pytest.mark.parametrize(
+    "fault", [fault for fault in FAULTS if fault.what not in WHOLE], ids=attrgetter("what")
+)
+def test_fault_breaks_the_baseline(monkeypatch: pytest.MonkeyPatch, fault: Fault) -> None:
+    recorded = without_fault(fault.seen_by)
+    fault.put(monkeypatch)
+    assert comparison.compare(rollout.run(brief(fault.seen_by)), recorded).failures != []
+
+
+@pytest.mark.parametrize(
+    "fault", [fault for fault in FAULTS if fault.what in WHOLE], ids=attrgetter("what")
+)
 def test_fault_turns_the_check_red(
     shell: Shell, monkeypatch: pytest.MonkeyPatch, fault: Fault
 ) -> None:
