@@ -14,9 +14,9 @@ CACHE = type(functools.lru_cache(abs))
 
 
 def pytest_runtest_setup() -> None:
-    """Forget the package's answers to all earlier calls."""
+    """Forget the package's answers to all earlier calls, and what tests drew with them."""
     for name, module in [*sys.modules.items()]:
-        if name.split(".")[0] == "fivebar_sim":
+        if name.split(".")[0] in ("fivebar_sim", "poses"):
             for value in vars(module).values():
                 if isinstance(value, CACHE):
                     value.cache_clear()

@@ -121,7 +121,7 @@ def edges(root: Path) -> list[Edge]:
     known = modules(root)
     found = set()
     for name, path in known.items():
-        for node, kind in statements(ast.parse(path.read_text(encoding="utf-8"))):
+        for node, kind in statements(parsed(path.read_text(encoding="utf-8"))):
             found |= {Edge(name, of, kind) for of in named(node, known) if of in known}
     return sorted(found)
 

@@ -91,6 +91,7 @@ def test_beyond_the_tolerance_is_status_1(
     main.__globals__["measured"] = lambda _, plain, settings=None: (
         runs(there, "x") if plain else runs(1e-3)
     )
+    main.__globals__["processors"] = dict  # the next test
     assert main([]) == status
     said = capsys.readouterr().out
     assert "plain mj_step, here: 1 of 2 scenarios have the same bits" in said
@@ -122,12 +123,18 @@ def test_setting_without_effect_is_status_1(
 ) -> None:
     verify = runpy.run_path(str(SCRIPTS / "determinism_processor.py"))["verify"]
     verify.__globals__["dispatched"] = lambda: ["AVX"]
-    verify.__globals__["libm"] = lambda: verify.__globals__["libm_under"]("")
+    verify.__globals__["libm_under"] = lambda tunables: "digest"
+    verify.__globals__["libm"] = lambda: "digest"  # no setting takes effect
     for name in ("NPY_DISABLE_CPU_FEATURES", "OPENBLAS_CORETYPE", "GLIBC_TUNABLES"):
         monkeypatch.delenv(name, raising=False)
     for name, value in asked.items():
         monkeypatch.setenv(name, value)
     assert verify() == status
+
+
+def test_another_process_computes_the_same_sines() -> None:
+    script = runpy.run_path(str(SCRIPTS / "determinism_processor.py"))
+    assert script["libm_under"]("") == script["libm"]()
 
 
 def test_version_that_does_not_exist_is_one_line() -> None:
