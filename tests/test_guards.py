@@ -320,7 +320,7 @@ def test_bounds_are_in_parts_of_the_leg() -> None:
     assert loop["high"] == pytest.approx(0.02 * FiveBar.load("classic").size)
     assert {each["name"] for each in long} == {
         *("branch", "loop", "torque", "chatter", "energy", "constraints", "step"),
-        *("solver", "stops"),
+        *("solver", "stops", "jolts"),
     }
 
 
@@ -375,6 +375,6 @@ def test_new_guard_is_a_rule_and_a_function(shell: Shell, monkeypatch: pytest.Mo
     assert shell("report", "run").status == 0
     page = Path("run/report.html").read_text()
     assert "depth: foot below 10 mm" in page
-    assert f"{1e3 * depth:.4g} mm" in page
+    assert f"{1e3 * depth:.4g}&nbsp;mm" in page
     assert shell("check", "short.toml", "--junit", "junit.xml").status == 1
     assert words in Path("junit.xml").read_text()

@@ -294,6 +294,7 @@ def _differences(runs: Sequence[StoredRun]) -> str:
     ]
     if not rows:
         return "<p>Nothing: the scenarios are the same.</p>"
+
     stacked = len(runs) <= MOST_STACKED
     what = "Keys of scenario.toml, in SI units."
     return html.table(what, ("key", *names(runs)), rows, stacked=stacked)

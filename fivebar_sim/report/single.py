@@ -221,6 +221,7 @@ def _words(key: str, value: Any) -> tuple[str, str]:
     alike = key.replace("load.stance.", "load.")
     peak = key.replace("whole.at.", "whole.")
     label = key.rpartition(".")[2].replace("_", " ")
+
     if alike in SHOWN and (value is None or is_finite(value)):
         label = SHOWN[alike][0]
         return f"{label}, in stance" if alike != key else label, shown(alike, value)

@@ -54,6 +54,7 @@ class Gait(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
         time = np.linspace(0.0, self.period, SAMPLES)
         x = self.path.nominal(time).position[:, 0]
         middle = 0.5 * float(x.min() + x.max())
+
         strides = self.strides or dict.fromkeys(LEGS, 1.0)
         return {
             leg: Ahead(

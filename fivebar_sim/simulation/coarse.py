@@ -107,6 +107,7 @@ def _sprung(scenario: Scenario) -> str | None:
     servo = scenario.servo
     if isinstance(scenario.controller, Feedback) or sim.integrator != "discrete":
         return None
+
     added = servo.kp * sim.timestep
     jerked = isinstance(scenario.scene, Ground) or scenario.path.ramp == 0.0
     if not jerked or not added > SPRUNG * servo.damping:

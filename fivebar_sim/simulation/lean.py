@@ -127,6 +127,7 @@ def _can_touch(model: mujoco.MjModel, geom: int) -> bool:
     others = np.flatnonzero((meets != 0) & (model.geom_bodyid != model.geom_bodyid[geom]))
     if not others.size:
         return False
+
     planes = model.geom_type[others] == mujoco.mjtGeom.mjGEOM_PLANE.value
     level = (model.geom_quat[others] == UPRIGHT).all() and not model.geom_bodyid[others].any()
     lowest = _lowest(model, geom)

@@ -198,6 +198,7 @@ def accelerated(scenario: Scenario, wanted: Motion, k: int) -> Array:
     still = np.zeros((1, 2))
     seen = Observation(k * scenario.sim.timestep, full.theta, full.theta_dot)
     less = full._replace(foot_ddot=still, theta_ddot=still)
+
     try:
         change = _answer(scenario, controller, seen, full)[0]
         change = change - _answer(scenario, controller, seen, less)[0]

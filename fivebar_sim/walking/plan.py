@@ -116,6 +116,7 @@ def _of_leg(
         duration=duration,
         sim=sim,
     )
+
     try:
         wanted = motion.plan(robot.leg, path, alone.steps, sim.timestep)
         asked = asked_setpoints(alone, controller, wanted)
