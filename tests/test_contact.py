@@ -20,6 +20,7 @@ from fivebar_sim import rollout
 from fivebar_sim.geometry import FiveBar
 from fivebar_sim.integrator import ON_BELT, ON_RAIL, Integrator
 from fivebar_sim.metrics.guards import Guards
+from fivebar_sim.model.leg import leg_spec, quiet
 from fivebar_sim.scenario import Scenario
 
 FLOOR = Floor(0.5, 0.006, 0.8, stiffness=1e4, damping=20.0)
@@ -90,6 +91,39 @@ def test_stiffer_models_agree_better() -> None:
         assert 0.06 < 1.0 - creeps.share / known.share < 0.09
     assert friction.coulomb(1.25, 2e4, 20.0).share > 1.07 * known.share
     assert friction.coulomb(1.25, 1e6, 100.0).share == pytest.approx(known.share, rel=3e-3)
+
+
+# how much the softness of the friction costs
+
+
+def rms_torques(plan: rollout.Plan) -> np.ndarray:
+    return np.array(list(rollout.execute(plan).metrics["load"]["torque_rms"].values()))
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(
+    ("name", "more"), [("treadmill-trot", (1.10, 1.07)), ("doggo-landing", (1.034, 0.966))]
+)
+def test_faster_friction_changes_the_torques(name: str, more: tuple[float, float]) -> None:
+    """What docs/validation.md says: friction of 0.25 ms instead of the 5 ms of leg.xml."""
+    scenario = Scenario.load(name, ["limits={}", "sim.timestep=1.25e-4"])
+    plan = rollout.plan(scenario)
+    spec = leg_spec(
+        scenario.leg,
+        servo=scenario.servo,
+        scene=scenario.scene,
+        timestep=scenario.sim.timestep,
+        drive=getattr(scenario.controller, "drive", "position"),
+    )
+    foot = spec.geom("foot")
+    pair = spec.add_pair(geomname1="floor", geomname2="foot", condim=3)
+    pair.friction = [foot.friction[k] for k in (0, 0, 1, 2, 2)]
+    pair.solref = foot.solref
+    pair.solimp = foot.solimp
+    pair.solreffriction = (2.5e-4, 1.0)
+    with quiet():
+        fast = plan._replace(model=spec.compile())
+    np.testing.assert_allclose(rms_torques(fast) / rms_torques(plan), more, rtol=0.01)
 
 
 # why implicitfast creeps
