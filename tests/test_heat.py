@@ -95,6 +95,9 @@ def test_the_continuous_torque_is_the_largest_that_it_survives() -> None:
     assert just.temperature == pytest.approx(COOLING.hottest, rel=1e-12)
     assert more.reaches(1.0) is not None
     assert just.reaches(1.0 + 1e-12) is None
+    # It comes ever nearer to where it goes to, and is never there.
+    assert just.used is not None
+    assert just.reaches(just.used) is None
 
 
 def test_the_heat_of_the_hotter_motor_counts() -> None:
