@@ -5,10 +5,13 @@ Names load on first use, so that the pure NumPy packages never wait for MuJoCo.
 
 from __future__ import annotations
 
-import importlib
-from typing import TYPE_CHECKING, Any
+# Not from typing, whose import would be the slowest part of the program's first moments, in which
+# nobody hears Ctrl-C yet; type checkers take it for the same.
+TYPE_CHECKING = False
 
 if TYPE_CHECKING:
+    from typing import Any
+
     from fivebar_sim import dynamics, errors, kinematics, model, workspace
     from fivebar_sim.control import Feedback, Setpoints
     from fivebar_sim.control.servo import Servo
@@ -57,6 +60,8 @@ _HOMES = {
 
 
 def __getattr__(name: str) -> Any:
+    import importlib
+
     if name in _MODULES:
         return importlib.import_module(f"fivebar_sim.{_MODULES[name]}")
     if name in _HOMES:
