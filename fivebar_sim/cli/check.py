@@ -45,7 +45,6 @@ def check(
             the scenario fails again, never deleted.
         quiet: Print nothing but errors.
     """
-    from fivebar_sim.cli import console
     from fivebar_sim.files import resources
     from fivebar_sim.regression import baseline
 
@@ -72,6 +71,8 @@ def check(
             checked.append(each)
 
     if not quiet:
+        from fivebar_sim.cli import console
+
         console.print_check(checked, screen())
 
     _publish(checked, junit, summary)

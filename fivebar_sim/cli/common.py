@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterable, Iterator, Sequence
+from contextlib import nullcontext
 from typing import TYPE_CHECKING, Annotated
 
 from tyro.conf import Positional, UseAppendAction, arg
@@ -119,6 +120,9 @@ def screen(*, stderr: bool = False, quiet: bool = False):
 
 def spinner(what: str, *, quiet: bool):
     """Return a context that shows a spinner on a terminal's stderr."""
+    # Rich takes a tenth of a second to import.
+    if quiet:
+        return nullcontext()
     from rich.text import Text
 
-    return screen(stderr=True, quiet=quiet).status(Text(what))
+    return screen(stderr=True).status(Text(what))

@@ -91,12 +91,11 @@ def _run(
     """Run the scenarios one after another; return the highest exit status."""
     import json
 
-    from fivebar_sim.cli import console
     from fivebar_sim.runs import directory
 
     status = 0
     metrics = {}
-    out = screen()
+    out = None if quiet or as_json else screen()
     for order, place in zip(orders, places, strict=True):
         name = order.scenario.name
         try:
@@ -111,7 +110,9 @@ def _run(
             continue
         metrics[name] = result.metrics
         status = max(status, FAILED if result.verdict == "fail" else 0)
-        if not (quiet or as_json):
+        if out is not None:
+            from fivebar_sim.cli import console
+
             console.print_result(result, str(place), out)
 
     if as_json:
