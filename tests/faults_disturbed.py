@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import replace
 from typing import Any
 
@@ -31,12 +32,12 @@ MODEL: dict[str, Change] = {
 }
 
 
-def in_the_model(plan: Plan) -> dict[str, Plan]:
+def in_the_model(plan: Plan, names: Iterable[str] = MODEL) -> dict[str, Plan]:
     """Return plans of which the model is not what the controller thinks it is."""
     plans = {}
-    for name, change in MODEL.items():
+    for name in names:
         compiled = rollout.plan(plan.scenario).model
-        change(compiled)
+        MODEL[name](compiled)
         plans[name] = plan._replace(model=compiled)
     return plans
 
@@ -51,10 +52,10 @@ def in_time(plan: Plan) -> Plan:
     return rollout.plan(other(scenario, servo=late))
 
 
-def in_length(plan: Plan) -> dict[str, Plan]:
+def in_length(plan: Plan, names: Iterable[str] = LENGTHS) -> dict[str, Plan]:
     """Return plans of a leg of which one length is longer by 1 % of the leg's size."""
     leg = plan.scenario.leg
-    legs = {name: replace(leg, **{name: getattr(leg, name) + 0.01 * leg.size}) for name in LENGTHS}
+    legs = {name: replace(leg, **{name: getattr(leg, name) + 0.01 * leg.size}) for name in names}
     return {name: rollout.plan(other(plan.scenario, leg=leg)) for name, leg in legs.items()}
 
 

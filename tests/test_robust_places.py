@@ -54,7 +54,7 @@ def test_many_writers_of_one_place_all_end_well(
 
     def write(result: Result) -> None:
         try:
-            for _ in range(20):
+            for _ in range(8):
                 result.write(place)
         except BaseException as error:
             errors.append(error)
