@@ -14,8 +14,9 @@ from fivebar_sim.metrics import tracking
 from fivebar_sim.metrics.columns import Record
 from fivebar_sim.metrics.limits import Limit, judge
 from fivebar_sim.metrics.measured import Judged, Verdict, with_verdict
+from fivebar_sim.runs import coarse
 from fivebar_sim.scenario import Scenario
-from fivebar_sim.simulation import coarse, feedback, measure
+from fivebar_sim.simulation import feedback, measure
 from fivebar_sim.simulation.plan import Plan, period_steps, plan
 from fivebar_sim.simulation.provenance import provenance
 from fivebar_sim.simulation.recorder import Recorder

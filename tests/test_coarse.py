@@ -7,8 +7,8 @@ import pytest
 from fivebar_sim import rollout
 from fivebar_sim.metrics.limits import look_up
 from fivebar_sim.rollout import Result
+from fivebar_sim.runs.coarse import CHECK
 from fivebar_sim.scenario import Scenario
-from fivebar_sim.simulation.coarse import CHECK
 
 PLAIN = ("limits={}", "converge={}")
 

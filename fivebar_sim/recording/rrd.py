@@ -18,9 +18,10 @@ import numpy as np
 
 from fivebar_sim.arrays import Array
 from fivebar_sim.errors import FiveBarError
+from fivebar_sim.files import file_stream
 from fivebar_sim.metrics.columns import Record
 from fivebar_sim.metrics.measured import Judged
-from fivebar_sim.recording import file_stream, foot, ground, layout
+from fivebar_sim.recording import foot, ground, layout
 from fivebar_sim.recording import leg as scene
 from fivebar_sim.recording.check import PROPERTY
 from fivebar_sim.recording.look import Look, looks
