@@ -155,6 +155,15 @@ def test_a_leg_that_rests_at_half_of_that_survives() -> None:
 def test_what_lasts_is_the_rest_not_the_step_before_it() -> None:
     scenario = Scenario.load("q8bot-xl330", [*AT_REST, "path.lift=0.01"])
     assert scenario.for_good == slice(100, 400)
+    result = rollout.run(scenario)
+    winding = scenario.servo.winding
+    assert winding is not None
+    torque = np.stack([result.record["torque_A"], result.record["torque_E"]], axis=-1)
+    rest, moving = (
+        heat.heating(torque[part], winding).watts for part in (slice(100, 400), scenario.window)
+    )
+    assert list(result.metrics["load"]["heat"].values()) == pytest.approx(rest, rel=1e-12)
+    assert np.abs(moving / rest - 1.0).max() > 0.1
     periodic = Scenario.load("q8bot-xl330")
     assert periodic.for_good == periodic.window
 
