@@ -40,8 +40,19 @@ def joint(ax: Axes, point: Array, name: str, dx: float, dz: float) -> None:
     ax.text(point[0] + dx, point[1] + dz, name, fontsize=14, ha="center", va="center")
 
 
-def angle(ax: Axes, centre: Array, start: float, end: float, radius: float, name: str) -> None:
-    """Draw an angle from `start` to `end` [rad] with its name; anticlockwise if end > start."""
+def angle(
+    ax: Axes,
+    centre: Array,
+    start: float,
+    end: float,
+    radius: float,
+    name: str,
+    place: tuple[float, float] = (0.5, 1.28),
+) -> None:
+    """Draw an angle from `start` to `end` [rad]; anticlockwise if end > start.
+
+    Its name stands at `place`: the part of the angle, and that of the radius.
+    """
     low, high = sorted((np.degrees(start), np.degrees(end)))
     size = 2.0 * radius
     ax.add_patch(
@@ -57,8 +68,9 @@ def angle(ax: Axes, centre: Array, start: float, end: float, radius: float, name
         arrowprops={"arrowstyle": "->", "color": GREY},
         zorder=1,
     )
-    middle = 0.5 * (start + end)
-    at = centre + 1.28 * radius * np.array([np.cos(middle), np.sin(middle)])
+    part, out = place
+    towards = start + part * (end - start)
+    at = centre + out * radius * np.array([np.cos(towards), np.sin(towards)])
     ax.text(at[0], at[1], name, color="#555555", fontsize=12, ha="center", va="center")
 
 
@@ -90,7 +102,8 @@ def draw(ax: Axes, leg: FiveBar) -> None:
     for motor in (A, E):
         ax.plot([motor[0], motor[0] + 17], [motor[1]] * 2, color=GREY, lw=0.9, ls=":", zorder=1)
 
-    angle(ax, A, 0.0, float(q[0]), 9.0, r"$\theta_A$")
+    # Beside the line to F, which crosses the arc.
+    angle(ax, A, 0.0, float(q[0]), 9.0, r"$\theta_A$", (0.7, 0.6))
     angle(ax, A, alpha, float(q[0]), 19.0, r"$\beta$")
     angle(ax, A, 0.0, alpha, 14.0, r"$\alpha$")
     angle(ax, E, 0.0, float(q[2]), 9.0, r"$\theta_E$")
@@ -101,9 +114,10 @@ def draw(ax: Axes, leg: FiveBar) -> None:
 
 def frame(ax: Axes) -> None:
     """Draw the hip frame at O."""
-    for dx, dz, name in ((14, 0, "x"), (0, 14, "z")):
+    # The arrow along x ends before E, and has its name below.
+    for dx, dz, name, at in ((11, 0, "x", (9, -3.5)), (0, 14, "z", (0, 16))):
         ax.annotate("", (dx, dz), (0, 0), arrowprops={"arrowstyle": "-|>", "color": DARK, "lw": 1})
-        ax.text(1.15 * dx, 1.15 * dz, name, fontsize=11, ha="center", va="center")
+        ax.text(*at, name, fontsize=11, ha="center", va="center")
     ax.text(0, -5, "O", fontsize=11, ha="center", va="center")
 
 
