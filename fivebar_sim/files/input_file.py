@@ -38,11 +38,16 @@ def read_json(path: Path) -> Any:
 
     Raises:
         OSError: As `check`, or it cannot be read.
-        ValueError: It is not JSON, or has a key twice: which one counts would not be clear.
-        RecursionError: It is nested too deep.
+        ValueError: It is not JSON, is nested too deep, or has a key twice: which one counts would
+            not be clear.
     """
     check(path, TEXT)
-    return json.loads(path.read_text(encoding="utf-8"), object_pairs_hook=_object)
+    text = path.read_text(encoding="utf-8")
+    try:
+        return json.loads(text, object_pairs_hook=_object)
+    # Where that is, and in which words Python says it, differs from release to release.
+    except RecursionError:
+        raise ValueError("nested too deep") from None
 
 
 def _object(pairs: list[tuple[str, Any]]) -> dict[str, Any]:

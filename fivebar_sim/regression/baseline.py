@@ -123,7 +123,7 @@ def read(path: Path) -> Baseline | None:
         return None
     except OSError as error:
         raise ConfigError(f"cannot read baseline {path}: {error.strerror}") from None
-    except (ValueError, RecursionError) as error:
+    except ValueError as error:
         raise ConfigError(f"{path} is not a baseline: not JSON: {error}") from None
 
     where = f"{path} is not a baseline"

@@ -29,7 +29,7 @@ def read(file: Path, *, grounded: bool) -> Judged:
         metrics = input_file.read_json(file)
     except OSError as error:
         raise RunDirectoryError(f"cannot read {file}: {error.strerror or error}") from None
-    except (ValueError, RecursionError) as error:
+    except ValueError as error:
         raise RunDirectoryError(f"{file} is not JSON: {error}") from None
 
     # msgspec would recurse as deep as the file goes.
