@@ -177,7 +177,9 @@ def chain_points(leg: FiveBar | LegArrays, q: Array) -> Points:
     D = E + leg.L4 * unit(q[..., 2])
     C_left = B + leg.L2 * unit(psi2)
     C_right = D + leg.L3 * unit(psi3)
-    F = C_left + leg.L6 * unit(psi2 + leg.bend)
+    # Without an extension a fifth of the trigonometry would be multiplied by zero.
+    plain = isinstance(leg, FiveBar) and leg.L6 == 0.0
+    F = C_left + (0.0 if plain else leg.L6 * unit(psi2 + leg.bend))
     return Points(B, C_left, C_right, D, F)
 
 
