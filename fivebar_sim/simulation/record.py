@@ -8,7 +8,7 @@ import mujoco
 import numpy as np
 
 from fivebar_sim import dynamics, kinematics
-from fivebar_sim.arrays import Array, Bools
+from fivebar_sim.arrays import Array, Bools, blocks
 from fivebar_sim.control.servo import Drive, MotorStep, applied_torque
 from fivebar_sim.control.servo import saturated as clipped
 from fivebar_sim.kinematics.stops import Ranges
@@ -149,7 +149,17 @@ def _referred(planned: Plan) -> Array:
     )
     leg = planned.scenario.leg
     force = wanted.force[1:]
-    needed = dynamics.inverse(leg, theta, rate, acceleration, force, payload=wanted.payload)
+    needed = np.empty_like(theta)
+    for rows in blocks(len(needed)):
+        needed[rows] = dynamics.inverse(
+            leg,
+            theta[rows],
+            rate[rows],
+            acceleration[rows],
+            force[rows],
+            payload=wanted.payload,
+        )
+
     found = lasting.lone(needed, np.zeros(2))
     worst = int(np.argmax(found.max(axis=1)))
     used = sampling.accelerated(planned.scenario, wanted, worst + 1)
@@ -160,9 +170,19 @@ def _fed(planned: Plan, asked: Array) -> Array:
     """Return the torque for a single step that setpoints feed forward [N m], (N, 2)."""
     scenario = planned.scenario
     wanted = planned.motion
-    needed = dynamics.step_torques(
-        scenario.leg, wanted.q, wanted.timestep, wanted.force[:-1], payload=wanted.payload
-    )
+    needed = np.empty_like(asked)
+    for rows in blocks(len(needed)):
+        # One step more, which is thrown away: a step's acceleration is known from the one before.
+        first = max(rows.start - 1, 0)
+        found = dynamics.step_torques(
+            scenario.leg,
+            wanted.q[first : rows.stop + 1],
+            wanted.timestep,
+            wanted.force[first : rows.stop],
+            payload=wanted.payload,
+        )
+        needed[rows] = found[rows.start - first :]
+
     # In both: the motion needs it, and a setpoint asks for it. One alone may turn round as fast.
     start = wanted.q[0, MOTOR_JOINTS]
     told = scenario.servo.kp * lasting.lone(asked, start)
