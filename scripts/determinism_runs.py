@@ -16,6 +16,9 @@ from typing import Any
 import mujoco
 import numpy as np
 
+WHOLE = int(mujoco.mjtState.mjSTATE_INTEGRATION)
+CTRL = int(mujoco.mjtState.mjSTATE_CTRL)
+
 
 class Plain:
     """As much of `mujoco.batch.Batch` as the package uses, one MjData a leg, one after another."""
@@ -28,6 +31,9 @@ class Plain:
     def set_models(self, models: Sequence[Any]) -> None:
         """Give each leg its own model, and begin anew."""
         self._models = list(models)
+        self.model = self._models[0]
+        self.state = np.zeros((self.nsim, mujoco.mj_stateSize(self.model, WHOLE)))
+        self._outputs: dict[str, np.ndarray] = {}
         self._datas = [mujoco.MjData(model) for model in self._models]
         self.time = np.zeros(self.nsim)
         self.qpos = np.array([data.qpos for data in self._datas])
@@ -35,11 +41,31 @@ class Plain:
         self.qacc_warmstart = np.zeros_like(self.qvel)
         self.warning = np.zeros((self.nsim, len(self._datas[0].warning.number), 2), np.int32)
 
+    def bind(self, name: str) -> np.ndarray:
+        """Return the commands of all legs, or what every step leaves of another field."""
+        if name == "ctrl":
+            first = mujoco.mj_stateSize(self.model, CTRL - 1)  # of all that comes before
+            return self.state[:, first : first + self.model.nu]
+
+        rows = [getattr(data, name) for data in self._datas]
+        return self._outputs.setdefault(name, np.array(rows))
+
+    def step(self) -> None:
+        """Take one step with the commands that `bind` gave to be filled."""
+        for i, model in enumerate(self._models):
+            data = self._load(i)
+            data.ctrl[:] = self.bind("ctrl")[i]
+            mujoco.mj_step(model, data)
+            self._save(i)
+            mujoco.mj_getState(model, data, self.state[i], WHOLE)
+            for name, rows in self._outputs.items():
+                rows[i] = getattr(data, name)
+
     def rollout(
         self,
         steps: int,
         control: np.ndarray,
-        control_spec: int = int(mujoco.mjtState.mjSTATE_CTRL),
+        control_spec: int = CTRL,
         record: Sequence[Any] = (),
         ids: Any = None,
     ) -> dict[Any, Any]:
