@@ -130,14 +130,14 @@ def test_batch_of_payloads_and_forces_has_the_bits_of_each_alone() -> None:
 
 
 def test_many_like_legs_are_one_call_and_keep_their_bits() -> None:
-    """Seventy legs in one array of poses: no sum depends on how many are in it."""
+    """Thirty-three legs in one array of poses: no sum depends on how many are in it."""
     plans = [
         planned("duration=0.1", "controller.name=computed_torque", f"sim.seed={i}",
                 "sensors.noise=1e-5", f"path.frequency={25.0 + 0.1 * i}", "path.ramp=0.02")
-        for i in range(70)
+        for i in range(33)
     ]  # fmt: skip
     together = rollout.run_all(plans, 2)
-    for i in (0, 33, 69):
+    for i in (0, 16, 32):
         for name, column in rollout.execute(plans[i]).record.items():
             np.testing.assert_array_equal(column, together[i].record[name], name)
 
