@@ -108,6 +108,23 @@ def test_foot_sticks_within_the_cone_and_on_the_floor() -> None:
     assert creep.sticks(force, 0.5).tolist() == [True, True, False, False, False]
 
 
+def test_change_is_a_part_of_each_motor_s_own_torque() -> None:
+    leg = FiveBar.load("classic")
+    course = creep.Course(
+        timestep=1e-3,
+        q=np.tile(kinematics.hanging(leg), (3, 1)),
+        rate_A=np.array([0.0, 0.1, 0.2]),
+        ground=np.tile([0.0, 1.0], (3, 1)),
+        torque=np.array([[0.1, 0.0], [-0.1, 0.0], [0.1, 0.0]]),
+    )
+    found = creep.changes(leg, creep.Footing(1.0, 0.05, 8.0), course)
+    crept = creep.distance(leg, course.q, course.rate_A, np.ones(3, dtype=bool), 0.05, 1e-3)
+    cost = creep.cost(leg, course.q[:, ::2], crept, 8.0)
+    assert np.abs(cost[1:]).min() > 0.0
+    np.testing.assert_allclose(found[:, 0], cost[:, 0] / 0.1, rtol=1e-12)
+    np.testing.assert_array_equal(found[:, 1], 0.0)  # a motor without torque has none to lose
+
+
 def test_cost_is_what_holds_the_foot_back_along_x_alone() -> None:
     """The torques make a side force kp x / |j|^2, and none along z where the leg is symmetric."""
     leg = FiveBar.load("classic")

@@ -15,7 +15,7 @@ from fivebar_sim.arrays import Array
 from fivebar_sim.errors import ArgumentError, ConfigError
 from fivebar_sim.geometry import FiveBar
 from fivebar_sim.kinematics.stops import angle_at_C
-from fivebar_sim.metrics import guards, lasting
+from fivebar_sim.metrics import ground, guards, lasting
 from fivebar_sim.metrics.guards import Guard, Guards
 from fivebar_sim.report import single
 from fivebar_sim.rollout import Plan, Result
@@ -353,6 +353,23 @@ def test_everyone_is_told(shell: Shell, monkeypatch: pytest.MonkeyPatch) -> None
     metrics = json.loads(Path("run/metrics.json").read_text())
     assert not metrics["limits"]
     assert metrics["verdict"] == "fail"
+
+
+def test_the_part_that_was_first_is_named_with_the_worst_of_all(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def depths(leg: FiveBar, record: dict[str, Array], trunk: float) -> dict[str, Array]:
+        time = record["time"]
+        # From step 30, 10 and 20 on: neither the first nor the last name, nor the deepest.
+        return {
+            "joint A": np.where(time > 0.0305, 0.3, 0.0),
+            "joint B": np.where(time > 0.0105, 0.1, 0.0),
+            "trunk": np.where(time > 0.0205, 0.2, 0.0),
+        }
+
+    monkeypatch.setattr(ground, "depths", depths)
+    found = tripped(ran("rail-landing", "duration=0.8"))["floor"]
+    assert (found.part, found.time, found.value) == ("joint B", pytest.approx(0.011), 0.3)
 
 
 def test_new_guard_is_a_rule_and_a_function(shell: Shell, monkeypatch: pytest.MonkeyPatch) -> None:
