@@ -21,12 +21,13 @@ WRONG = (
 
 
 def test_wrong_share_is_seen(shell: Shell) -> None:
-    """It passes every guard; three runs give the limit that `discrete` has too."""
+    """The guard contact sees it in each run; three runs give the limit that `discrete` has too."""
     said = shell("converge", *WRONG, "--json")
     found = json.loads(said.out)
     assert said.status == 1
     assert found["timesteps"] == [1.6e-4, 0.8e-4, 0.4e-4]
-    assert found["tripped"] == [[], [], []]
+    assert [len(run) for run in found["tripped"]] == [1, 1, 1]
+    assert all("guard contact: a foot that should stick" in run[0] for run in found["tripped"])
     share = found["metrics"]["load.share_A"]
     torque = found["metrics"]["load.torque_rms.E"]
     assert share["value"] > 0.6
