@@ -82,9 +82,11 @@ def table() -> list[Mutant]:
 
 
 def room_of(file: str) -> str:
-    """Return the room that a file of the table is in."""
+    """Return the room that a file of the table is in, also one that mutmut leaves out there."""
+    path = Path(file)
     return next(
-        name for name, room in mutate.ROOMS.items() if any(Path(file).match(f) for f in room.files)
+        (name for name, room in mutate.ROOMS.items() if any(path.match(f) for f in room.files)),
+        path.parts[1],
     )
 
 
