@@ -8,6 +8,7 @@ import shlex
 import shutil
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 from msgspec.structs import replace
@@ -209,7 +210,7 @@ def test_comparison_tells_runs_apart(runs: dict[str, Path], pages: dict[str, Pag
     assert "sim.timestep" not in differing
 
 
-OWN_STYLE = {"svg.hashsalt": None, "xtick.major.size": 20.0, "font.size": 20}
+OWN_STYLE: Any = {"svg.hashsalt": None, "xtick.major.size": 20.0, "font.size": 20}
 """What a user's matplotlibrc may say."""
 
 
@@ -233,7 +234,8 @@ def test_same_runs_same_pictures(
     monkeypatch.setattr(single, "figures", lambda run: every(run)[:3:2])
     monkeypatch.setattr(look, "svg", lambda figure, key, alt: "<svg></svg>")
     kept = []
-    for style in ({}, OWN_STYLE):
+    plain: Any = {}
+    for style in (plain, OWN_STYLE):
         with matplotlib.rc_context(style):
             *pictures, _ = report.write([runs["trot"]], tmp_path / "a.html", tmp_path / "png")
         assert [path.name for path in pictures] == ["foot-path.png", "tracking-error.png"]
