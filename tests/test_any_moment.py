@@ -126,6 +126,27 @@ def test_a_run_that_is_struck_leaves_the_old_one_or_the_new_one(
     strike(COMMANDS["run over"], 1, sent, after=random.Random(int(sent)).uniform(0.0, 1.0))
 
 
+STRUCK_AT_ONCE = """
+import sys
+from fivebar_sim.cli import main
+
+class Striking:
+    def find_spec(self, name, *others):
+        if name == "fivebar_sim.cli.signals":
+            raise KeyboardInterrupt
+
+sys.meta_path.insert(0, Striking())
+sys.exit(main())
+"""
+"""The program, struck by Ctrl-C before anything of it is imported that could listen."""
+
+
+def test_ctrl_c_before_anybody_listens_leaves_no_traceback() -> None:
+    with started([sys.executable, "-c", STRUCK_AT_ONCE, "--version"], text=True) as process:
+        assert process.communicate()[1] == ""
+    assert process.returncode == -signal.SIGINT
+
+
 @pytest.mark.long
 @pytest.mark.parametrize("name", COMMANDS)
 def test_commands_struck_a_hundred_times_leave_nothing_half(shell: Shell, name: str) -> None:

@@ -13,7 +13,15 @@ __all__ = ["main"]
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command line; return its exit status."""
-    from fivebar_sim.cli import signals
+    try:
+        from fivebar_sim.cli import signals
+    except KeyboardInterrupt:
+        # Nothing listens yet: it ends as any program does, without a traceback.
+        import signal
+
+        signal.signal(signal.SIGINT, signal.SIG_DFL)
+        signal.raise_signal(signal.SIGINT)
+        raise
 
     # What comes while the program itself is imported waits until somebody listens.
     with signals.held():
