@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import msgspec
 import mujoco
 import numpy as np
@@ -10,8 +12,10 @@ import pytest
 from fivebar_sim import dynamics, kinematics, model
 from fivebar_sim.arrays import Array
 from fivebar_sim.control.servo import MotorStep, Servo, applied_torque
+from fivebar_sim.errors import ArgumentError
 from fivebar_sim.integrator import Integrator
 from fivebar_sim.robots import LEGS, Air, Floor, Hip, Robot
+from fivebar_sim.scenario import scenes
 from fivebar_sim.simulation.steps import simulate
 
 Q8BOT = Robot.load("q8bot")
@@ -161,3 +165,9 @@ def test_mass_and_inertia_are_the_robots() -> None:
     np.testing.assert_allclose(
         np.sort(trunk.inertia), np.sort(Q8BOT.trunk_mass / 12.0 * np.array(squares)), rtol=1e-9
     )
+
+
+@pytest.mark.parametrize("scene", [scenes.Rail(), "floor"])
+def test_scene_of_a_leg_is_refused(scene: Any) -> None:
+    with pytest.raises(ArgumentError, match=r"scene must be robots\.Air\(\) or robots\.Floor\(\)"):
+        model.build_robot(Q8BOT, scene)

@@ -11,11 +11,11 @@ import numpy as np
 from fivebar_sim import kinematics
 from fivebar_sim.arrays import Array
 from fivebar_sim.control.servo import Drive
-from fivebar_sim.errors import GeometryError
+from fivebar_sim.errors import ArgumentError, GeometryError
 from fivebar_sim.files import resources
 from fivebar_sim.integrator import Integrator
 from fivebar_sim.model.leg import HIP_HEIGHT, leg_spec, quiet, set_options, standing
-from fivebar_sim.robots import LEGS, Floor, Robot, Scene
+from fivebar_sim.robots import LEGS, Air, Floor, Robot, Scene
 
 BACKWARD = (0.0, 0.0, 0.0, 1.0)
 """Half a turn about z, as a quaternion."""
@@ -48,10 +48,15 @@ def build_robot(
         drive: Whether ctrl is an angle or a torque.
 
     Raises:
-        ArgumentError: Unknown integrator or drive, or a timestep that is not positive.
+        ArgumentError: Unknown integrator or drive, a timestep that is not positive, or a scene that
+            is none of a robot's.
         GeometryError: The legs do not reach below the trunk, or MuJoCo cannot compile them.
     """
     scene = Floor() if scene is None else scene
+    # A leg's scenes have the same base, and no file for robots.
+    if not isinstance(scene, Air | Floor):
+        raise ArgumentError(f"scene must be robots.Air() or robots.Floor(), got {scene!r}")
+
     q = kinematics.hanging(robot.leg)
     with quiet():
         file = resources.folder("models") / "robots" / f"{scene.kind}.xml"

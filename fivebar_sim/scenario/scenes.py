@@ -25,7 +25,7 @@ class Scene(
 
     @property
     def kind(self) -> str:
-        """The name of its file in models/scenes/."""
+        """The name of its file in models/scenes/; of a robot's scene in models/robots/."""
         return str(self.__struct_config__.tag)
 
 
