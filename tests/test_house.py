@@ -259,3 +259,8 @@ def test_no_test_has_its_own_deadline_or_draw() -> None:
             source = path.read_text(encoding="utf-8")
             own = examples_set(source) if "settings(" in source else set()
             assert not own & {"deadline", "derandomize"}, name(path)
+
+
+def test_readme_fits_a_terminal() -> None:
+    lines = (ROOT / "README.md").read_text(encoding="utf-8").splitlines()
+    assert [line for line in lines if len(line) > 100] == []
