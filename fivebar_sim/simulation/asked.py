@@ -13,6 +13,7 @@ from fivebar_sim.control.interface import answer_of, is_numbers
 from fivebar_sim.control.servo import FARTHEST
 from fivebar_sim.control.step import ControlStep
 from fivebar_sim.errors import ConfigError, PoseError
+from fivebar_sim.metrics.columns import MOTORS
 from fivebar_sim.motion import Motion
 from fivebar_sim.simulation.plan import Plan, period_steps
 
@@ -123,7 +124,7 @@ def _why(command: Array, theta: Array) -> PoseError:
     row, motor = np.unravel_index(int(np.argmax(away)), away.shape)
     return PoseError(
         f"its setpoints must be within {FARTHEST:.4g} rad (half a turn) of the motors' angles, "
-        f"got one for {'AE'[motor]} that is {away[row, motor]:.4g} rad away",
+        f"got one for {MOTORS[motor]} that is {away[row, motor]:.4g} rad away",
         (int(row),),
     )
 
