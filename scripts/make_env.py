@@ -245,10 +245,12 @@ def alone(root: Path) -> Iterator[None]:
 
 
 def say_what_is_left_out() -> None:
-    """Print which extra this Python cannot have."""
+    """Print which extras this Python cannot have."""
+    version = ".".join(str(number) for number in sys.version_info[:2])
     if sys.version_info >= (3, 13):
-        version = ".".join(str(number) for number in sys.version_info[:2])
         print(f"dm-control is left out: its labmaze has no wheel for Python {version}.")
+    if sys.version_info >= (3, 15):
+        print(f"pymoo, pandas and Ray are left out: they have no wheel for Python {version}.")
 
 
 def would_install(root: Path, kind: str, pip: str | None = None) -> list[str]:
