@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple, Self
+from typing import NamedTuple, Self
 
 import msgspec
 import numpy as np
@@ -17,10 +17,8 @@ from numpy.typing import ArrayLike
 
 from fivebar_sim.errors import ArgumentError, ConfigError
 from fivebar_sim.paths.base import TIME_ROUNDING, FootPath, Sample, check_number
+from fivebar_sim.paths.spline import Spline
 from fivebar_sim.paths.track import TimedPairs, read_bytes, read_track
-
-if TYPE_CHECKING:
-    from scipy.interpolate import CubicSpline
 
 HEADERS = {("time_s", "x_mm", "z_mm"): 1e-3, ("time_s", "x_m", "z_m"): 1.0}
 """The legal headers, each with its unit in metres."""
@@ -29,7 +27,7 @@ WHAT = "foot path"
 
 
 class _Curve(NamedTuple):
-    spline: CubicSpline
+    spline: Spline
     span: float
     period: float | None
 
@@ -85,9 +83,9 @@ class Csv(FootPath, frozen=True, tag="csv", dict=True):
         """
         spline, _, period = self._curve
         t = self._times(time)
-        # A periodic spline repeats by itself, but loses digits far out.
+        # Beyond its knots the last piece would go on.
         t = t if period is None else np.mod(t, period)
-        return Sample(spline(t), spline(t, 1), spline(t, 2))
+        return Sample(*spline.evaluate(t))
 
     def resolve(self, folder: Path) -> Self:
         """Return the path bound to the file in folder, read and checked.
@@ -115,9 +113,6 @@ class Csv(FootPath, frozen=True, tag="csv", dict=True):
 
     @cached_property
     def _curve(self) -> _Curve:
-        # Slow to import, and only this kind of path needs it.
-        from scipy.interpolate import CubicSpline
-
         track = read_track(self.content, HEADERS, WHAT, Path(self.file))
         if not self.periodic:
             if not self.ramp <= track.span:
@@ -125,10 +120,10 @@ class Csv(FootPath, frozen=True, tag="csv", dict=True):
                     f"{self.file}: ramp must be in [0, {track.span:g}] s, the time that the path "
                     f"lasts, got {self.ramp:g} s"
                 )
-            return _Curve(CubicSpline(*track, bc_type="not-a-knot"), track.span, None)
+            return _Curve(Spline.through(*track), track.span, None)
 
         time, foot = _close_loop(track, self.given, self.file)
-        return _Curve(CubicSpline(time, foot, bc_type="periodic"), track.span, float(time[-1]))
+        return _Curve(Spline.through(time, foot, periodic=True), track.span, float(time[-1]))
 
 
 def _close_loop(track: TimedPairs, period: float | None, where: str) -> TimedPairs:
