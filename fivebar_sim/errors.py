@@ -61,6 +61,10 @@ class DivergedError(FiveBarError, RuntimeError):
         self.time = time
 
 
+class ExtraError(FiveBarError, ImportError):
+    """A package that is not installed, because only an extra of fivebar-sim asks for it."""
+
+
 class RunDirectoryError(FiveBarError, OSError):
     """A run directory that cannot be written, replaced or read."""
 

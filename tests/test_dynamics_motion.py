@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import sys
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
@@ -15,7 +16,13 @@ from poses import BATCHES
 
 from fivebar_sim import dynamics, kinematics
 from fivebar_sim.arrays import Array
-from fivebar_sim.errors import ArgumentError, DivergedError, LoopOpenError, SingularError
+from fivebar_sim.errors import (
+    ArgumentError,
+    DivergedError,
+    ExtraError,
+    LoopOpenError,
+    SingularError,
+)
 from fivebar_sim.geometry import FiveBar
 
 LEG = FiveBar.load("classic")
@@ -190,6 +197,12 @@ def test_law_without_a_number_ends_the_motion() -> None:
     assert info.value.time == 0.004
     with pytest.raises(DivergedError, match="foot_force is not finite"):
         dynamics.integrate(LEG, START, STILL, (0.0, 0.01), foot_force=late)
+
+
+def test_precision_without_scipy_names_the_extra(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "scipy.integrate", None)
+    with pytest.raises(ExtraError, match=r"needs SciPy .*: pip install 'fivebar-sim\[precise\]'"):
+        dynamics.integrate(LEG, START, STILL, (0.0, 0.01))
 
 
 def test_bad_arguments_are_refused() -> None:

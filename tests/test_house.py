@@ -178,6 +178,14 @@ def test_pure_rooms_import_nothing_heavy() -> None:
         assert not HEAVY & names, room
 
 
+def test_only_what_has_an_extra_for_it_imports_scipy() -> None:
+    """It is a seventh of what a run would have to install."""
+    folders = ("fivebar_sim", "controllers")
+    files = [path for folder in folders for path in (ROOT / folder).rglob("*.py")]
+    users = {name(path) for path in files if "scipy" in imports(path.read_text(encoding="utf-8"))}
+    assert users == {"fivebar_sim/dynamics/motion.py"}
+
+
 def test_package_never_imports_controllers() -> None:
     lazy = "def f():\n    from fivebar_controllers.x import y, z\n"
     assert list(imports(lazy)) == ["fivebar_controllers"]

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -17,8 +17,17 @@ from numpy.typing import ArrayLike
 from fivebar_sim.arrays import Array, as_pairs, at, broadcast, finite, first_index
 from fivebar_sim.checks import check_number
 from fivebar_sim.dynamics.chain import Chain, Pose, Vector
-from fivebar_sim.errors import ArgumentError, DivergedError, LoopOpenError, SingularError
+from fivebar_sim.errors import (
+    ArgumentError,
+    DivergedError,
+    ExtraError,
+    LoopOpenError,
+    SingularError,
+)
 from fivebar_sim.geometry import FiveBar
+
+if TYPE_CHECKING:
+    from scipy.integrate import DOP853
 
 Law = Callable[[float, Array, Array], ArrayLike]
 """(t [s], theta, theta_dot) -> torques (tau_A, tau_E) [N m] or forces (x, z) [N]; arrays have the
@@ -126,6 +135,8 @@ def integrate(
 ) -> Motion:
     """Return the motion of one leg to high precision: DOP853, order 8 under error control.
 
+    The method is SciPy's, which nothing else of the package needs: install the extra `precise`.
+
     Args:
         leg: The leg.
         theta: (theta_A, theta_E) at the first time [rad], (2,).
@@ -145,6 +156,7 @@ def integrate(
         DivergedError: The motion runs into a singular pose, or a law returns NaN; `.time` is the
             last time that the integrator reached.
         ArgumentError: As `simulate`; or more than one leg, or times that do not increase.
+        ExtraError: SciPy is not installed.
     """
     chain = Chain.of(leg, assembly, payload)
     return integrate_chain(chain, theta, theta_dot, times, torque, foot_force, rtol, atol)
@@ -307,16 +319,14 @@ def _stack_accelerations(plant: _Plant, t: float, q: Array, w: Array) -> Array:
 
 def _dop853(plant: _Plant, y: Array, times: Array, rtol: float, atol: float) -> Array:
     """Return the states of one leg at the given times, (N, 4)."""
-    # The only use of scipy in dynamics, and slow to import.
-    from scipy.integrate import DOP853
-
+    solver_of = _find_dop853()
     states = np.empty((len(times), 4))
     row = 1
     reached = float(times[0])
     states[0] = y
 
     try:
-        solver = DOP853(plant.slope, times[0], y, times[-1], rtol=rtol, atol=atol)
+        solver = solver_of(plant.slope, times[0], y, times[-1], rtol=rtol, atol=atol)
         while row < len(times):
             solver.step()
             reached = float(solver.t)
@@ -330,6 +340,17 @@ def _dop853(plant: _Plant, y: Array, times: Array, rtol: float, atol: float) -> 
     except _UnfitError as error:
         raise _diverged(reached, str(error)) from error
     return states
+
+
+def _find_dop853() -> type[DOP853]:
+    """Return SciPy's integrator, slow to import; ExtraError without SciPy."""
+    try:
+        from scipy.integrate import DOP853
+    except ImportError as error:
+        raise ExtraError(
+            f"integrate needs SciPy ({error}): pip install 'fivebar-sim[precise]'"
+        ) from None
+    return DOP853
 
 
 def _diverged(time: float, why: str) -> DivergedError:
