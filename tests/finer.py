@@ -12,9 +12,9 @@ from fivebar_sim.errors import FiveBarError
 from fivebar_sim.metrics import guards
 from fivebar_sim.metrics.catalogue import ABSOLUTE
 from fivebar_sim.metrics.limits import look_up
-from fivebar_sim.regression.convergence import refined
 from fivebar_sim.rollout import Result
 from fivebar_sim.scenario import Scenario
+from fivebar_sim.scenario.refined import refined
 
 PLANNED = {
     "classic-ellipse": 1.0,
@@ -87,8 +87,13 @@ def case(seed: int) -> tuple[str, list[str]]:
         sets.append("sim.integrator=implicitfast")
     if asked:
         natural = NATURAL[scenario.leg.name] if scenario.leg.name in NATURAL else 2e-5
-        return name, [*sets, *_asked(rng, near, natural, h)]
-    return name, [*sets, *_planned(rng, near, scenario, h)]
+        sets += _asked(rng, near, natural, h)
+    else:
+        sets += _planned(rng, near, scenario, h)
+    if rng.random() < 0.15 and scenario.leg.L6 == 0.0:
+        # Too short for its path, the leg follows the edge of what it reaches.
+        sets += ["path.outside=nearest", f"leg.L1={0.85 * scenario.leg.L1}"]
+    return name, sets
 
 
 def _planned(
@@ -113,9 +118,6 @@ def _planned(
         sets.append(f"servo.limit={near(0.5, 4.0)}")
     if rng.random() < 0.2 and scenario.path.ramp > 0.0:
         sets.append("path.ramp=0.0")
-    if rng.random() < 0.15 and scenario.leg.L6 == 0.0:
-        sets.append("path.outside=nearest")
-        sets.append(f"leg.L1={0.85 * scenario.leg.L1}")
     return sets
 
 

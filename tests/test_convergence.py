@@ -8,8 +8,9 @@ import pytest
 
 from fivebar_sim.control import Feedback
 from fivebar_sim.errors import ConfigError
-from fivebar_sim.regression.convergence import Convergence, converge, holds, refined
+from fivebar_sim.regression.convergence import Convergence, converge, holds
 from fivebar_sim.scenario import Scenario
+from fivebar_sim.scenario.refined import refined
 
 
 def series(limit: float, error: float, order: float, runs: int = 3) -> list[float]:

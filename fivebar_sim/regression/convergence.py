@@ -14,8 +14,6 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
-import msgspec
-
 from fivebar_sim import rollout
 from fivebar_sim.errors import ConfigError, DivergedError
 from fivebar_sim.integrator import Integrator
@@ -23,7 +21,7 @@ from fivebar_sim.metrics import guards
 from fivebar_sim.metrics.catalogue import ABSOLUTE
 from fivebar_sim.metrics.limits import look_up
 from fivebar_sim.scenario import Scenario
-from fivebar_sim.scenario.scenario import MOST_STEPS
+from fivebar_sim.scenario.refined import refined
 
 FEWEST = 2
 MOST = 6
@@ -121,48 +119,6 @@ def holds(found: Convergence, bar: float, tolerance: float) -> bool:
     if found.value is None or found.limit is None:
         return False
     return abs(found.value - found.limit) <= tolerance
-
-
-def refined(scenario: Scenario, parts: int, integrator: Integrator) -> Scenario:
-    """Return the same experiment in finer steps.
-
-    A bus's rate is rounded to whole timesteps; here to those of the scenario itself, so that
-    commands come at the same times. Control periods are whole timesteps already, and delays need
-    not be.
-
-    Args:
-        scenario: The experiment.
-        parts: Into how many steps each of its timesteps is cut.
-        integrator: MuJoCo's integrator.
-
-    Raises:
-        ConfigError: The run has too many steps.
-    """
-    h = scenario.sim.timestep
-    if scenario.steps * parts > MOST_STEPS:
-        raise ConfigError(
-            f"{scenario.name}: a run may have {MOST_STEPS} steps, got {scenario.steps * parts} at "
-            f"a timestep of {h / parts:g} s"
-        )
-
-    servo = scenario.servo
-    if servo.rate is not None:
-        # The least is one step: a bus may be as fast as the timesteps.
-        period = max(h, _whole(1.0 / servo.rate, h))
-        whole = math.isclose(1.0, servo.rate * period)
-        servo = msgspec.structs.replace(servo, rate=servo.rate if whole else 1.0 / period)
-    return msgspec.structs.replace(
-        scenario,
-        servo=servo,
-        sim=msgspec.structs.replace(scenario.sim, timestep=h / parts, integrator=integrator),
-    )
-
-
-def _whole(seconds: float, timestep: float) -> float:
-    """Return a time in whole timesteps [s]."""
-    # Within rounding it is whole already: its last bits are the scenario's.
-    steps = round(min(seconds / timestep, MOST_STEPS))
-    return seconds if math.isclose(seconds, steps * timestep) else steps * timestep
 
 
 def plans(scenario: Scenario, halvings: int, integrator: Integrator) -> list[rollout.Plan]:

@@ -1,0 +1,53 @@
+"""The same experiment in shorter steps, or over a shorter time."""
+
+from __future__ import annotations
+
+import math
+
+import msgspec
+
+from fivebar_sim.errors import ConfigError
+from fivebar_sim.integrator import Integrator
+from fivebar_sim.scenario.scenario import MOST_STEPS, Scenario
+
+
+def refined(scenario: Scenario, parts: int, integrator: Integrator) -> Scenario:
+    """Return the same experiment in finer steps.
+
+    A bus's rate is rounded to whole timesteps; here to those of the scenario itself, so that
+    commands come at the same times. Control periods are whole timesteps already, and delays need
+    not be.
+
+    Args:
+        scenario: The experiment.
+        parts: Into how many steps each of its timesteps is cut.
+        integrator: MuJoCo's integrator.
+
+    Raises:
+        ConfigError: The run has too many steps.
+    """
+    h = scenario.sim.timestep
+    if scenario.steps * parts > MOST_STEPS:
+        raise ConfigError(
+            f"{scenario.name}: a run may have {MOST_STEPS} steps, got {scenario.steps * parts} at "
+            f"a timestep of {h / parts:g} s"
+        )
+
+    servo = scenario.servo
+    if servo.rate is not None:
+        # The least is one step: a bus may be as fast as the timesteps.
+        period = max(h, _whole(1.0 / servo.rate, h))
+        whole = math.isclose(1.0, servo.rate * period)
+        servo = msgspec.structs.replace(servo, rate=servo.rate if whole else 1.0 / period)
+    return msgspec.structs.replace(
+        scenario,
+        servo=servo,
+        sim=msgspec.structs.replace(scenario.sim, timestep=h / parts, integrator=integrator),
+    )
+
+
+def _whole(seconds: float, timestep: float) -> float:
+    """Return a time in whole timesteps [s]."""
+    # Within rounding it is whole already: its last bits are the scenario's.
+    steps = round(min(seconds / timestep, MOST_STEPS))
+    return seconds if math.isclose(seconds, steps * timestep) else steps * timestep
