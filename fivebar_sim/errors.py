@@ -49,6 +49,14 @@ class ConfigError(FiveBarError, ValueError):
     """A scenario, leg or path file with an illegal value; the message names file and key."""
 
 
+class UnknownError(ConfigError):
+    """A key or a name that nothing has; the message lists those that there are, with a guess."""
+
+
+class WorkersError(FiveBarError, RuntimeError):
+    """Workers that are not there, or are gone; what they have done so far is kept."""
+
+
 class DivergedError(FiveBarError, RuntimeError):
     """A simulation that broke down.
 

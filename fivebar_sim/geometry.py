@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Any
 
 from fivebar_sim.checks import check_number
-from fivebar_sim.errors import ConfigError, GeometryError, unknown
+from fivebar_sim.errors import ConfigError, GeometryError, UnknownError, unknown
 from fivebar_sim.files import presets
 from fivebar_sim.links import Link, ball, capsule, combined, moved, rod
 
@@ -252,7 +252,7 @@ class FiveBar:
         known = [field.name for field in fields(cls)]
         for key in table:
             if key not in known:
-                raise ConfigError(f"{where}: {unknown('key', key, known)}")
+                raise UnknownError(f"{where}: {unknown('key', key, known)}")
 
         try:
             values: dict[str, Any] = {

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from fivebar_sim.arrays import Array
 from fivebar_sim.control.servo import Drive, Servo
-from fivebar_sim.errors import ConfigError, FiveBarError, unknown
+from fivebar_sim.errors import ConfigError, FiveBarError, UnknownError, unknown
 from fivebar_sim.files.installed import installed, load
 from fivebar_sim.geometry import FiveBar
 from fivebar_sim.integrator import Integrator
@@ -110,7 +110,7 @@ def find(name: str) -> type[Any]:
     """
     controllers = known()
     if name not in controllers:
-        raise ConfigError(unknown("controller", name, controllers))
+        raise UnknownError(unknown("controller", name, controllers))
 
     value = controllers[name].value
     kind = load(controllers[name], "controller")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from fivebar_sim.errors import ConfigError, unknown
+from fivebar_sim.errors import UnknownError, unknown
 from fivebar_sim.files import resources, tables
 
 
@@ -21,7 +21,7 @@ def find(source: str | Path, what: str) -> Path:
     known = resources.shipped(f"models/{what}s")
     path = known.get(str(source), Path(source))
     if path.suffix != ".toml":
-        raise ConfigError(f"{unknown(f'{what} preset', str(source), known)}; or a path to a .toml")
+        raise UnknownError(f"{unknown(f'{what} preset', str(source), known)}; or a path to a .toml")
     return path
 
 

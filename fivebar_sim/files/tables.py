@@ -11,7 +11,7 @@ from typing import Any, TypeVar, get_args, get_type_hints
 
 import msgspec
 
-from fivebar_sim.errors import ConfigError, unknown
+from fivebar_sim.errors import ConfigError, UnknownError, unknown
 from fivebar_sim.files import input_file
 
 T = TypeVar("T")
@@ -149,7 +149,7 @@ def check_keys(table: Mapping[str, Any], known: Iterable[str], where: str) -> No
     known = list(known)
     for key in table:
         if key not in known:
-            raise ConfigError(f"{where}: {unknown('key', key, known)}")
+            raise UnknownError(f"{where}: {unknown('key', key, known)}")
 
 
 def bounds(

@@ -13,7 +13,7 @@ from fivebar_sim.checks import check_number
 from fivebar_sim.control import Feedback, Setpoints
 from fivebar_sim.control.servo import Servo
 from fivebar_sim.control.servo import read_table as read_servo
-from fivebar_sim.errors import ArgumentError, ConfigError, unknown
+from fivebar_sim.errors import ArgumentError, ConfigError, UnknownError, unknown
 from fivebar_sim.files import tables
 from fivebar_sim.files.tables import Table
 from fivebar_sim.geometry import FiveBar
@@ -205,7 +205,7 @@ def _preset(
         # Before the changes, so that nobody looks for the file's error in the scenario.
         check(table, str(source))
     except ConfigError as error:
-        raise ConfigError(f"{where}: {name}.preset: {error}") from None
+        raise type(error)(f"{where}: {name}.preset: {error}") from None
 
     return table, own
 
@@ -217,7 +217,7 @@ def _kind(name: str, value: Any, where: str) -> type[Any]:
         raise ConfigError(f"{where}: [{name}] needs a kind; known: {', '.join(sorted(known))}")
     kind = value["kind"]
     if not isinstance(kind, str) or kind not in known:
-        raise ConfigError(f"{where}: {name}.kind: {unknown(name, str(kind), known)}")
+        raise UnknownError(f"{where}: {name}.kind: {unknown(name, str(kind), known)}")
     return known[kind]
 
 
@@ -238,7 +238,7 @@ def force(value: Any, where: str, folder: Path) -> FootForce | None:
 def scene(value: Any, where: str) -> Scene:
     """Return the scene of a kind's name, such as "rail", or of a table."""
     if isinstance(value, str) and value not in scenes.KINDS:
-        raise ConfigError(f"{where}: {unknown('scene', value, scenes.KINDS)}")
+        raise UnknownError(f"{where}: {unknown('scene', value, scenes.KINDS)}")
     own = _table("scene", value, where)
     return tables.convert(own, _kind("scene", own, where), "scene", where)
 
@@ -252,5 +252,5 @@ def controller(value: Any, where: str) -> tuple[str, Setpoints | Feedback]:
     try:
         kind = control.find(str(name))
     except ConfigError as error:
-        raise ConfigError(f"{where}: controller.name: {error}") from None
+        raise type(error)(f"{where}: controller.name: {error}") from None
     return str(name), tables.convert(own, kind, "controller", where)
