@@ -14,7 +14,7 @@ PACKAGES = {"fivebar_sim": "fivebar_sim", "fivebar_controllers": "controllers/fi
 
 LEVELS = (
     "errors",
-    "arrays checks files units",
+    "arrays checks files units workers",
     "links",
     "geometry integrator paths",
     "kinematics",
@@ -29,14 +29,14 @@ LEVELS = (
     "recording tasks",
     "runs environment gym",
     "rollout report vector",
-    "regression",
+    "regression sweep",
     "cli pytest_plugin",
     "fivebar_sim __main__",
 )
 """Rooms from the bottom to the top: each may import those of the lines above its own."""
 
 MOST_AT_THE_TOP = 15
-MOST_IN_A_ROOM = 14
+MOST_IN_A_ROOM = 16
 """Modules. In the largest rooms, `cli` and `metrics`, each is a command or a part of a verdict."""
 
 
