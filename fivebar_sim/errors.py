@@ -86,6 +86,8 @@ def unknown(what: str, name: str, known: Iterable[str]) -> str:
         known: The legal names.
     """
     legal = sorted(known)
-    close = get_close_matches(name, legal, n=1)
-    hint = f" (did you mean {close[0]!r}?)" if close else ""
+    # Letters that differ in case only are the nearest of all: leg.l2 for leg.L2.
+    lower = {each.lower(): each for each in reversed(legal)}
+    close = get_close_matches(name.lower(), lower, n=1)
+    hint = f" (did you mean {lower[close[0]]!r}?)" if close else ""
     return f"unknown {what} {name!r}; known: {', '.join(legal)}{hint}"

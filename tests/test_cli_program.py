@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import importlib
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -91,7 +93,9 @@ def test_help_is_quick() -> None:
 import sys
 from fivebar_sim.cli import main
 slow = {"rerun", "dm_control", "matplotlib", "mujoco", "scipy", "pyarrow"}
-for args in (["--version"], ["--help"], ["run", "--help"]):
+main(["--help"])
+print("slow:", sorted({"tyro", "rich", *slow} & set(sys.modules)))
+for args in (["--version"], ["-h"], ["run", "--help"]):
     try:
         main(args)
     except SystemExit as end:
@@ -99,7 +103,31 @@ for args in (["--version"], ["--help"], ["run", "--help"]):
     print("slow:", sorted(slow & set(sys.modules)))
 """
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert [line for line in done.stdout.splitlines() if "slow:" in line] == 3 * ["slow: []"]
+    assert [line for line in done.stdout.splitlines() if "slow:" in line] == 4 * ["slow: []"]
+
+
+def test_help_is_a_line_a_command(shell: Shell) -> None:
+    """The same line that the command's own help begins with, so that no list of them grows old."""
+    said = shell("--help")
+    assert (said.status, said.err) == (0, "")
+    for name, summary in fivebar.COMMANDS.items():
+        function = getattr(importlib.import_module(f"fivebar_sim.cli.{name}"), name)
+        assert function.__doc__.splitlines()[0] == summary
+        assert re.search(rf"^  {name} +{re.escape(summary)}$", said.out, re.MULTILINE)
+    assert max(map(len, said.out.splitlines())) <= 80
+    assert said.out.count("\n") <= len(fivebar.COMMANDS) + 7
+
+
+@pytest.mark.parametrize("which", fivebar.SHELLS)
+def test_completion_knows_every_command(shell: Shell, which: str) -> None:
+    with pytest.raises(SystemExit) as ended:
+        fivebar.main([fivebar.COMPLETION, which])
+    assert not ended.value.code
+    script = shell.capture.readouterr().out
+    assert [name for name in fivebar.COMMANDS if name not in script] == []
+    assert "--keep" in script
+    legal = "--completion takes bash, fish, zsh, got 'tcsh'"
+    assert shell.refused(fivebar.COMPLETION, "tcsh") == legal
 
 
 PROBE = [sys.executable, "-c", "import ctypes"]

@@ -257,6 +257,11 @@ def test_name_that_is_no_file_name_is_refused(tmp_path: Path, name: str) -> None
             "scene=aire",
             "unknown scene 'aire'; known: air, payload, rail, treadmill (did you mean 'air'?)",
         ),
+        (
+            "sim.Timestep=1e-3",
+            "[sim]: unknown key 'Timestep'; known: integrator, seed, timestep (did you mean "
+            "'timestep'?)",
+        ),
         ("scene=[1]", "scene must be the name of a kind or a table, got [1]"),
         ("duration=0", "duration must be in (0, inf) s, got 0"),
         ("duration=true", "duration must be in (0, inf) s, got True"),

@@ -29,7 +29,9 @@ def check(
     keep: Annotated[Path, arg(metavar="DIR")] = Path("runs/failed"),
     quiet: bool = False,
 ) -> int:
-    """Check scenarios against limits, guards and baselines; exit status 1 if any is broken.
+    """Check scenarios against limits, guards and recorded baselines.
+
+    Exit status 1 if any is broken.
 
     The baseline of FILE.toml is baselines/FILE.json beside it: recorded metrics, and how far each
     may move. A metric that got worse by more fails; one that got better is reported. Without a

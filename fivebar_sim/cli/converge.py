@@ -28,11 +28,12 @@ def converge(
     quiet: bool = False,
     json: bool = False,
 ) -> int:
-    """Run a scenario at h, h/2 and h/4: which metrics its timestep h already gets right.
+    """Show which metrics a scenario's timestep already gets right.
 
-    For each metric: its value at h, its value extrapolated to h = 0, the order, and the error at h;
-    beside it the limit under the other integrator. Exit status 1 if an error is above the bar, or
-    above the metric's own in the scenario's table [converge].
+    It is run with that timestep h, with h/2 and with h/4. For each metric: its value at h, its
+    value extrapolated to h = 0, the order, and the error at h; beside it the limit under the other
+    integrator. Exit status 1 if an error is above the bar, or above the metric's own in the
+    scenario's table [converge].
 
     Args:
         scenario: Name of a shipped scenario, or path of a TOML file.

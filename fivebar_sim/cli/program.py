@@ -17,12 +17,30 @@ from typing import Any
 
 from fivebar_sim.cli import memory, signals, terminal
 from fivebar_sim.cli.terminal import FAILED, INTERRUPTED, UNREAD, WRONG, say
-from fivebar_sim.errors import DivergedError, FiveBarError
+from fivebar_sim.errors import ConfigError, DivergedError, FiveBarError, unknown
 
-COMMANDS = ("run", "check", "converge", "replay", "report", "render", "view", "workspace")
-"""The commands; each is a function in the module of its name in `fivebar_sim.cli`."""
+COMMANDS = {
+    "run": "Simulate scenarios, check their limits, write run directories.",
+    "check": "Check scenarios against limits, guards and recorded baselines.",
+    "converge": "Show which metrics a scenario's timestep already gets right.",
+    "replay": "Open the recordings of runs in the Rerun viewer, on this machine.",
+    "report": "Explain a run, or compare several, on one self-contained HTML page.",
+    "render": "Draw a run: leg, target path, the foot's trail, the ground's force.",
+    "view": "Open MuJoCo's viewer: a scenario's run, or a leg moved by sliders.",
+    "workspace": "Draw what a leg's foot can reach, and how deep inside it is.",
+}
+"""The commands, each with the first line of its help.
+
+A command is a function in the module of its name in `fivebar_sim.cli`; its docstring begins with
+the same line.
+"""
 
 HELP = {"-h", "--help"}
+
+COMPLETION = "--completion"
+"""The option that prints a script with which a shell completes commands and their options."""
+
+SHELLS = ("bash", "fish", "zsh")
 
 FEWEST = 40
 """Columns of a terminal in which help can be read."""
@@ -105,28 +123,72 @@ def _call(args: list[str]) -> int:
         print(f"fivebar-sim {version('fivebar-sim')}")  # noqa: T201
         return 0
 
+    name = args[0] if args else ""
+    if name in HELP:
+        # Without the parser, which takes longer to import than everything else here.
+        print(_overview())  # noqa: T201
+        return 0
+    if name == COMPLETION:
+        return _print_completion(args[1:])
+    if name not in COMMANDS:
+        raise ConfigError(_no_command(name))
+
     # Help needs no memory to speak of.
     if not HELP & set(args):
         memory.check()
-
     # Imported late, so that errors and signals during the import are reported like all others.
     import tyro
 
     # The parser colours its messages and quotes the arguments in them.
     terminal.style(allowed=all(arg.isprintable() for arg in args))
-    config = (tyro.conf.FlagCreatePairsOff,)
-    name = args[0] if args else ""
     # Without the parsers of all other commands, which take three times as long.
-    if name in COMMANDS:
-        return tyro.cli(_command(name), prog=f"fivebar {name}", args=args[1:], config=config)
+    command = _command(name)
+    config = (tyro.conf.FlagCreatePairsOff,)
+    return tyro.cli(command, prog=f"fivebar {name}", args=args[1:], config=config)
 
-    return tyro.extras.subcommand_cli_from_dict(
+
+def _overview() -> str:
+    """Return the help of the program itself: a line for each command."""
+    widest = max(len(name) for name in COMMANDS)
+    lines = [f"  {name:{widest}}  {summary}" for name, summary in COMMANDS.items()]
+    return "\n".join(
+        [
+            "usage: fivebar COMMAND [ARGUMENTS]",
+            "",
+            "Simulate closed-chain five-bar legs; measure tracking and load sharing.",
+            "",
+            *lines,
+            "",
+            "fivebar COMMAND --help explains a command; fivebar --version names the version;",
+            f"fivebar {COMPLETION} {'|'.join(SHELLS)} prints what makes a shell complete them.",
+        ]
+    )
+
+
+def _no_command(name: str) -> str:
+    """Return the message for a first argument that is not a command."""
+    what = unknown("command", name, COMMANDS) if name else f"no command; known: {_known()}"
+    return f"{what}; see fivebar --help"
+
+
+def _known() -> str:
+    return ", ".join(sorted(COMMANDS))
+
+
+def _print_completion(shells: list[str]) -> int:
+    """Print the script that makes a shell complete commands and options."""
+    if len(shells) != 1 or shells[0] not in SHELLS:
+        raise ConfigError(f"{COMPLETION} takes {', '.join(SHELLS)}, got {' '.join(shells)!r}")
+    import tyro
+
+    # The parser prints it and then ends the program.
+    tyro.extras.subcommand_cli_from_dict(
         {name: _command(name) for name in COMMANDS},
         prog="fivebar",
-        description="Simulate closed-chain five-bar legs; measure tracking and load sharing.",
-        args=args,
-        config=config,
+        args=["--tyro-print-completion", *shells],
+        config=(tyro.conf.FlagCreatePairsOff,),
     )
+    return 0
 
 
 def _command(name: str) -> Callable[..., int]:

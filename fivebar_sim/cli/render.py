@@ -21,7 +21,7 @@ def render(
     height: int = 480,
     at: Annotated[float | None, arg(metavar="SECONDS")] = None,
 ) -> int:
-    """Draw a run: the leg, its target path, the foot's trail and the ground's force.
+    """Draw a run: leg, target path, the foot's trail, the ground's force.
 
     The motors have their letters, A and E; below the leg are the time, a scale bar and what the
     colours mean, as far as they fit.

@@ -15,7 +15,7 @@ RunDirs = Positional[Annotated[tuple[Path, ...], arg(metavar="[RUN_DIR ...]")]]
 
 
 def replay(run_dir: RunDir, others: RunDirs = (), /, *, web: bool = False, port: int = 0) -> int:
-    """Open the recording of a run in the Rerun viewer, or several overlaid; on this machine only.
+    """Open the recordings of runs in the Rerun viewer, on this machine.
 
     Args:
         run_dir: A run directory that `fivebar run` wrote.

@@ -26,7 +26,7 @@ def run(
     quiet: bool = False,
     json: bool = False,
 ) -> int:
-    """Simulate scenarios, check their limits, write their run directories.
+    """Simulate scenarios, check their limits, write run directories.
 
     Exit status: 1 if a limit is broken, a guard trips or a run diverges, 2 for wrong input. A
     scenario without limits is not judged: its status is 0 if its guards hold.

@@ -12,10 +12,10 @@ from fivebar_sim.cli.common import spinner
 def view(
     source: Positional[Annotated[str, arg(metavar="[LEG|SCENARIO]")]] = "classic-ellipse", /
 ) -> int:
-    """Open MuJoCo's viewer: a scenario's run in real time, or a leg that its sliders move.
+    """Open MuJoCo's viewer: a scenario's run, or a leg moved by sliders.
 
-    A scenario is simulated first, then shown over and over. A leg starts in its rest pose, and the
-    sliders command its servos.
+    A scenario is simulated first, then shown in real time, over and over. A leg starts in its rest
+    pose, and the sliders command its servos.
 
     Args:
         source: A scenario or a leg, by its shipped name or as a TOML file.

@@ -22,7 +22,7 @@ def workspace(
     out: Annotated[str | None, arg(metavar="PNG")] = None,
     path: Annotated[str | None, arg(metavar="SCENARIO")] = None,
 ) -> int:
-    """Draw the workspace of a leg: how deep inside or how far outside it a point is.
+    """Draw what a leg's foot can reach, and how deep inside it is.
 
     Args:
         leg: A preset's name or a leg's TOML file.
