@@ -44,7 +44,7 @@ class LegEnv(gymnasium.Env[Array, Array]):
     """One leg with one task.
 
     Observations are the task's `parts` one after the other (`layout` says where), actions its
-    `actions` within their bounds, both in SI units and radians; nothing is clipped.
+    `actions` within their bounds, both in SI units and radians; nothing but rounding is clipped.
     `gymnasium.wrappers.RescaleAction` makes actions of [-1, 1]. info has the reward's "terms" by
     name and the "reason" why the episode ended, "" before its end.
 

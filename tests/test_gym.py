@@ -19,10 +19,13 @@ from fivebar_sim import Scenario, kinematics, motion, run
 from fivebar_sim.control.sensors import Sensors
 from fivebar_sim.control.servo import Servo
 from fivebar_sim.errors import ArgumentError, ConfigError
+from fivebar_sim.files import resources
+from fivebar_sim.geometry import FiveBar
 from fivebar_sim.gym import LegEnv
 from fivebar_sim.metrics import ground
 from fivebar_sim.scenario.scenes import Treadmill
 from fivebar_sim.tasks import KINDS
+from fivebar_sim.tasks.episodes import to_bounds
 
 ROOT = Path(__file__).resolve().parents[1]
 SPACES_IN_SI = pytest.mark.filterwarnings(
@@ -85,6 +88,46 @@ def test_a_later_episode_is_as_the_first(kind: str) -> None:
         for action in actions(env.task, 1)[:7]:
             env.step(action)
     np.testing.assert_array_equal(*seen)
+
+
+def scaled(low: np.ndarray, high: np.ndarray, part: np.ndarray, dtype: type) -> np.ndarray:
+    """Return the actions that a policy's answers in [-1, 1] stand for, as SAC computes them."""
+    half = ((high - low) / 2.0).astype(dtype)
+    middle = ((high + low) / 2.0).astype(dtype)
+    return part.astype(dtype) * half + middle
+
+
+@pytest.mark.parametrize("preset", sorted(resources.shipped("models/legs")))
+def test_rounding_is_not_out_of_bounds(preset: str) -> None:
+    """10,000 spans of legs that differ: what float32 makes of a bound is the bound."""
+    random = np.random.default_rng(0)
+    rest = kinematics.home(FiveBar.load(preset))[::2] + random.uniform(-0.3, 0.3, (10_000, 2))
+    span = random.uniform(1e-3, np.pi, (10_000, 1))
+    low = rest - span
+    high = rest + span
+    for dtype in (np.float32, np.float64):
+        for end, part in ((low, -np.ones_like(rest)), (high, np.ones_like(rest))):
+            for sent in (end.astype(dtype), scaled(low, high, part, dtype)):
+                inside, outside = to_bounds(sent.astype(np.float64), low, high)
+                np.testing.assert_array_equal(inside, np.clip(sent, low, high))
+                assert not outside.any()
+            assert to_bounds(end + 4e-6 * part, low, high)[1].all()
+
+    within = random.uniform(low, high)
+    np.testing.assert_array_equal(to_bounds(within, low, high)[0], within)
+
+
+@pytest.mark.parametrize("span", [0.96, 0.3])
+def test_actions_of_wrappers_and_float32_reach_the_bounds(span: float) -> None:
+    env = LegEnv("track", span=span)
+    outer = gymnasium.wrappers.RescaleAction(env, np.float64(-1.0), np.float64(1.0))
+    for part in (np.ones(2), -np.ones(2), np.ones(2, np.float32), -np.ones(2, np.float32)):
+        outer.reset(seed=0)
+        outer.step(part)
+    upper: Any = env.episodes.high.astype(np.float32)
+    env.step(upper)
+    with pytest.raises(ArgumentError, match=r"^action theta\[0\] must be in"):
+        env.step(env.episodes.high + 4e-6)
 
 
 # oracle

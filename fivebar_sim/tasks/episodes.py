@@ -22,6 +22,9 @@ from fivebar_sim.metrics.columns import MOTORS_FROM_END
 from fivebar_sim.tasks.base import Part, Task
 from fivebar_sim.tasks.motion import TIME, motion
 
+ROUNDINGS = 4
+"""How many units in the last place of a float32 an action may be outside, as rounding leaves it."""
+
 
 class Outcome(NamedTuple):
     """What agents get after a control period, or at the start of an episode.
@@ -107,7 +110,7 @@ class Episodes:
         return qpos
 
     def check_action(self, action: object, shape: tuple[int, ...]) -> Array:
-        """Return an action as an array, unchanged.
+        """Return an action as an array; what lies outside by rounding alone is moved to the bound.
 
         Raises:
             ArgumentError: Not finite numbers of that shape within the bounds; nothing is clipped.
@@ -116,8 +119,7 @@ class Episodes:
         if values.shape != shape:
             raise ArgumentError(f"action must have shape {shape}, got {values.shape}")
 
-        # Written so that NaN is outside too.
-        outside = ~((values >= self.low) & (values <= self.high))
+        inside, outside = to_bounds(values, self.low, self.high)
         if outside.any():
             index = tuple(int(i) for i in np.argwhere(outside)[0])
             name, unit, number = part_at(self.task.actions, index[-1])
@@ -128,7 +130,7 @@ class Episodes:
                 f"got {float(values[index])!r} at index {index}"
             )
 
-        return values
+        return inside
 
     def commands(self, action: Array) -> Array:
         """Return what reaches the motors in each step of the next control period, (n, every, 2).
@@ -203,6 +205,18 @@ class Episodes:
         observation = task.observation(seen, now, targets)
 
         return Outcome(observation, reward, terms, terminated, truncated, reason)
+
+
+def to_bounds(values: Array, low: Array, high: Array) -> tuple[Array, Bools]:
+    """Return numbers moved to the bound that they miss by rounding, and which miss it by more.
+
+    An agent's network scales its answer, of [-1, 1], as centre + half * answer in float32: some
+    roundings of numbers that are at most as large as the larger bound.
+    """
+    largest = np.maximum(np.abs(low), np.abs(high)).astype(np.float32)
+    inside = np.clip(values, low, high)
+    # Written so that NaN is outside too.
+    return inside, ~(np.abs(values - inside) <= ROUNDINGS * np.spacing(largest))
 
 
 def part_at(parts: dict[str, Part], index: int) -> tuple[str, str, int]:
