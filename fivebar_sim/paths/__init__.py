@@ -15,6 +15,7 @@ from fivebar_sim.paths.gait import Gait
 from fivebar_sim.paths.hop import Hop
 from fivebar_sim.paths.lines import Lines
 from fivebar_sim.paths.shapes import Circle, Ellipse, FigureEight, Line
+from fivebar_sim.paths.sine import Sine
 from fivebar_sim.paths.step import Step
 
 __all__ = [
@@ -30,6 +31,7 @@ __all__ = [
     "Lines",
     "PathSpec",
     "Sample",
+    "Sine",
     "Step",
     "kinds",
 ]
@@ -37,7 +39,7 @@ __all__ = [
 GROUP = "fivebar_sim.paths"
 """The entry points by which other packages bring kinds of paths."""
 
-PathSpec = Circle | Csv | Ellipse | FigureEight | Gait | Hop | Line | Lines | Step
+PathSpec = Circle | Csv | Ellipse | FigureEight | Gait | Hop | Line | Lines | Sine | Step
 KINDS: dict[str, type[FootPath]] = {
     str(kind.__struct_config__.tag): kind for kind in get_args(PathSpec)
 }
