@@ -36,7 +36,8 @@ def test_rates_are_derivatives_between_the_seams() -> None:
     h = 1e-6
     time = np.array([0.01, 0.1, 0.2, 0.25, 0.3, 0.45])
     now = DOGGO.nominal(time)
-    before, after = DOGGO.nominal(time - h), DOGGO.nominal(time + h)
+    before = DOGGO.nominal(time - h)
+    after = DOGGO.nominal(time + h)
     np.testing.assert_allclose(
         (after.position - before.position) / (2 * h), now.velocity, atol=1e-6
     )
