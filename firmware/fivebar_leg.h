@@ -55,8 +55,8 @@ typedef struct {
     fivebar_real outer;   /* near + far [m] */
     fivebar_real low;     /* inner^2 [m^2] */
     fivebar_real high;    /* outer^2 [m^2] */
-    fivebar_real least;   /* low less the slack for rounding [m^2] */
-    fivebar_real most;    /* high and the slack for rounding [m^2] */
+    fivebar_real least;   /* square of inner less the slack for rounding [m^2]; 0: no hole */
+    fivebar_real most;    /* square of outer and the slack [m^2] */
     fivebar_real product; /* (near - far) (near + far) [m^2] */
 } fivebar_chain;
 
@@ -81,7 +81,7 @@ typedef struct {
     fivebar_chain to_foot;   /* A, B, F */
     fivebar_chain to_C;      /* E, D, C */
     fivebar_chain knee_knee; /* B, C, D */
-    fivebar_real apart2;     /* least |BD|^2 of a closed loop [m^2] */
+    fivebar_real apart2;     /* |BD|^2 up to which B counts as on D [m^2] */
 } fivebar_leg;
 
 /* The exported leg. */
@@ -169,15 +169,14 @@ int fivebar_hip_forward(const fivebar_leg *leg, const fivebar_hip *hip,
 
 /* A servo takes commands first .. last (counts, microseconds, degrees), at equal steps of angle:
  *     angle = offset + direction theta, plus whole turns, in [low, high] (at most a turn wide)
- *     command = first + (angle - low) per_radian, rounded to the nearest, half up */
+ *     command = first + (angle - low) (last - first) / (high - low), to the nearest, half up */
 typedef struct {
-    fivebar_real offset;     /* angle of the servo at theta = 0 [rad] */
-    int direction;           /* +1 if it grows with theta, -1 if the servo is mounted mirrored */
-    fivebar_real low;        /* least angle of the servo [rad] */
-    fivebar_real high;       /* greatest [rad] */
-    fivebar_real per_radian; /* steps of the command per radian, above 0 */
-    int32_t first;           /* command at low */
-    int32_t last;            /* command at high */
+    fivebar_real offset; /* angle of the servo at theta = 0 [rad] */
+    int direction;       /* +1 if it grows with theta, -1 if the servo is mounted mirrored */
+    fivebar_real low;    /* least angle of the servo [rad] */
+    fivebar_real high;   /* greatest [rad] */
+    int32_t first;       /* command at low */
+    int32_t last;        /* command at high, above first by at most 10^6 */
 } fivebar_servo;
 
 /* The command of a motor angle. FIVEBAR_OUT_OF_LIMITS outside [low, high], _BAD_ARGUMENT for a

@@ -1,0 +1,1085 @@
+/* The kinematics of a closed five-bar leg; fivebar_leg.h says what each function does.
+ *
+ * `fivebar_sim.firmware` in Python is the same arithmetic, operation by operation: change both.
+ */
+#include "fivebar_leg.h"
+
+#include <float.h>
+
+/* The same bits everywhere need each operation rounded on its own, NaN and infinity included. */
+#if defined(__FAST_MATH__) || (defined(__FINITE_MATH_ONLY__) && __FINITE_MATH_ONLY__)
+#error "fivebar_leg.c needs IEEE arithmetic: compile it without -ffast-math, -Ofast and the like"
+#endif
+#if defined(FLT_EVAL_METHOD) && FLT_EVAL_METHOD != 0
+#error "fivebar_leg.c needs float arithmetic in float: on x86 compile it with -mfpmath=sse -msse2"
+#endif
+#if defined(__clang__)
+#pragma STDC FP_CONTRACT OFF
+#elif defined(__GNUC__)
+#pragma GCC optimize("fp-contract=off")
+#else
+#pragma STDC FP_CONTRACT OFF
+#endif
+
+#ifdef FIVEBAR_DOUBLE
+#define REAL(x) x
+#define EPSILON DBL_EPSILON
+typedef uint64_t digits;
+#else
+#define REAL(x) x##f
+#define EPSILON FLT_EPSILON
+typedef uint32_t digits;
+#endif
+
+#define LARGEST_ANGLE ((fivebar_real)FIVEBAR_LARGEST_ANGLE)
+
+/* ---- Elementary functions ----------------------------------------------------------------- */
+
+/* pi / 2 in three parts; products of the first two with up to 41 quarter turns are exact. */
+#ifdef FIVEBAR_DOUBLE
+#define QUARTER_1 1.5707963267948912
+#define QUARTER_2 5.3903028581580306e-15
+#define QUARTER_3 8.8437205661357006e-29
+#define QUARTERS_PER_RADIAN 0.63661977236758138
+#define TURNS_PER_RADIAN 0.15915494309189535
+#define PI 3.1415926535897931
+#define PI_REST 1.2246467991473532e-16
+#define TAN_EIGHTH 0.41421356237309503
+#define MANTISSA 53
+#else
+#define QUARTER_1 1.57079315f
+#define QUARTER_2 3.17493686e-06f
+#define QUARTER_3 2.56334407e-12f
+#define QUARTERS_PER_RADIAN 0.636619747f
+#define TURNS_PER_RADIAN 0.159154937f
+#define PI 3.14159274f
+#define PI_REST -8.74227766e-08f
+#define TAN_EIGHTH 0.414213568f
+#define MANTISSA 24
+#endif
+
+/* Of scripts/firmware_polynomials.py, ascending powers of x^2:
+ * (sin(x) / x - 1) / x^2,   (cos(x) - 1 + x^2 / 2) / x^4,   (atan(x) / x - 1) / x^2 */
+#ifdef FIVEBAR_DOUBLE
+static const fivebar_real SINE[] = {-0.16666666666666666,    0.0083333333333333315,
+                                    -0.00019841269841265065, 2.7557319219339167e-06,
+                                    -2.5052106232447578e-08, 1.6058531618986147e-10,
+                                    -7.5866971177069183e-13};
+static const fivebar_real COSINE[] = {0.041666666666666664,   -0.0013888888888888887,
+                                      2.4801587301584645e-05, -2.7557319221402824e-07,
+                                      2.0876755791080422e-09, -1.1470460887609959e-11,
+                                      4.7458719020432915e-14};
+static const fivebar_real ARC[] = {
+    -0.33333333333333331,  0.19999999999999804,  -0.14285714285659828,  0.11111111105155447,
+    -0.090909087535008773, 0.076922963750321427, -0.066664248857382549, 0.058789289978347752,
+    -0.052304542706502442, 0.045515932206265493, -0.034570561981427744, 0.016285756855221028};
+#else
+static const fivebar_real SINE[] = {-0.166666642f, 0.00833274797f, -0.000195878907f};
+static const fivebar_real COSINE[] = {0.0416666642f, -0.00138883025f, 2.45479423e-05f};
+static const fivebar_real ARC[] = {-0.333333313f, 0.199995399f, -0.142639562f, 0.107437313f,
+                                   -0.0645192787f};
+#endif
+#define POLYNOMIAL(table, z) horner(table, (int)(sizeof(table) / sizeof(table[0])), z)
+
+static fivebar_real horner(const fivebar_real *c, int count, fivebar_real z)
+{
+    fivebar_real sum = c[count - 1];
+    int k;
+
+    for (k = count - 2; k >= 0; k--) {
+        sum = sum * z + c[k];
+    }
+    return sum;
+}
+
+/* The square root as one instruction, which IEEE 754 rounds correctly; a call of sqrtf would pull in
+ * libm and errno. Without such an instruction it is found digit by digit. */
+#if defined(FIVEBAR_SQRT_BY_DIGITS)
+#define BY_DIGITS 1
+#elif defined(__SSE2__)
+#include <emmintrin.h>
+#ifdef FIVEBAR_DOUBLE
+#define ROOT(x) _mm_cvtsd_f64(_mm_sqrt_sd(_mm_setzero_pd(), _mm_set_sd(x)))
+#else
+#define ROOT(x) _mm_cvtss_f32(_mm_sqrt_ss(_mm_set_ss(x)))
+#endif
+#elif defined(__aarch64__) && defined(FIVEBAR_DOUBLE)
+#define ROOT_ASM(y, x) __asm__("fsqrt %d0, %d1" : "=w"(y) : "w"(x))
+#elif defined(__aarch64__)
+#define ROOT_ASM(y, x) __asm__("fsqrt %s0, %s1" : "=w"(y) : "w"(x))
+#elif defined(__ARM_FP) && (__ARM_FP & 8) && defined(FIVEBAR_DOUBLE)
+#define ROOT_ASM(y, x) __asm__("vsqrt.f64 %P0, %P1" : "=w"(y) : "w"(x))
+#elif defined(__ARM_FP) && (__ARM_FP & 4) && !defined(FIVEBAR_DOUBLE)
+#define ROOT_ASM(y, x) __asm__("vsqrt.f32 %0, %1" : "=t"(y) : "t"(x))
+#elif defined(__riscv_flen) && __riscv_flen >= 64 && defined(FIVEBAR_DOUBLE)
+#define ROOT_ASM(y, x) __asm__("fsqrt.d %0, %1" : "=f"(y) : "f"(x))
+#elif defined(__riscv_flen) && __riscv_flen >= 32 && !defined(FIVEBAR_DOUBLE)
+#define ROOT_ASM(y, x) __asm__("fsqrt.s %0, %1" : "=f"(y) : "f"(x))
+#elif defined(__wasm__) && defined(FIVEBAR_DOUBLE)
+#define ROOT(x) __builtin_sqrt(x)
+#elif defined(__wasm__)
+#define ROOT(x) __builtin_sqrtf(x)
+#else
+#define BY_DIGITS 1
+#endif
+
+/* Return the square root of x >= 0. */
+static fivebar_real square_root(fivebar_real x)
+{
+#if defined(ROOT)
+    return ROOT(x);
+#elif defined(ROOT_ASM)
+    fivebar_real y;
+
+    ROOT_ASM(y, x);
+    return y;
+#else
+    fivebar_real scale = REAL(1.0);
+    digits mantissa;
+    digits rest = 0;
+    digits root = 0;
+    int k;
+
+    if (!(x > REAL(0.0))) {
+        return REAL(0.0);
+    }
+    /* Powers of two are exact: x becomes 1 .. 4, and its digits a whole number. */
+    while (x < REAL(1.0)) {
+        x *= REAL(4.0);
+        scale *= REAL(0.5);
+    }
+    while (x >= REAL(4.0)) {
+        x *= REAL(0.25);
+        scale *= REAL(2.0);
+    }
+    mantissa = (digits)(x * (fivebar_real)((digits)1 << (MANTISSA - 1)));
+
+    /* One digit more than the result has; the remainder cannot be zero where that digit is 1. */
+    for (k = MANTISSA; k >= 0; k--) {
+        digits pair = 2 * k >= MANTISSA + 1 ? mantissa >> (2 * k - MANTISSA - 1)
+                                            : mantissa << (MANTISSA + 1 - 2 * k);
+        digits next = 2 * root * 2 + 1;
+
+        rest = (rest << 2) | (pair & 3);
+        root = root << 1;
+        if (rest >= next) {
+            rest -= next;
+            root |= 1;
+        }
+    }
+    return (fivebar_real)((root + 1) >> 1) * (scale / (fivebar_real)((digits)1 << (MANTISSA - 1)));
+#endif
+}
+
+static int is_finite(fivebar_real x)
+{
+    /* NaN and infinity less themselves are NaN. */
+    return x - x == REAL(0.0);
+}
+
+static fivebar_real magnitude(fivebar_real x)
+{
+    return x < REAL(0.0) ? -x : x;
+}
+
+/* Return x less a whole number of quarter turns, whose count is stored; |x| is at most
+ * FIVEBAR_LARGEST_ANGLE, and quarters_each is 1, or 4 for whole turns. */
+static fivebar_real reduce(fivebar_real x, fivebar_real per_radian, int quarters_each, int *count)
+{
+    fivebar_real scaled = x * per_radian;
+    int nearest = (int)(scaled < REAL(0.0) ? scaled - REAL(0.5) : scaled + REAL(0.5));
+    fivebar_real quarters = (fivebar_real)(nearest * quarters_each);
+
+    *count = nearest;
+    return ((x - quarters * QUARTER_1) - quarters * QUARTER_2) - quarters * QUARTER_3;
+}
+
+/* Return x less whole turns, within half a turn of 0. */
+static fivebar_real within_turn(fivebar_real x)
+{
+    int turns;
+
+    return reduce(x, TURNS_PER_RADIAN, 4, &turns);
+}
+
+/* Store (cos, sin) of an angle of at most FIVEBAR_LARGEST_ANGLE. */
+static void unit(fivebar_real angle, fivebar_real e[2])
+{
+    int quarters;
+    fivebar_real r = reduce(angle, QUARTERS_PER_RADIAN, 1, &quarters);
+    fivebar_real z = r * r;
+    fivebar_real sine = r + (r * z) * POLYNOMIAL(SINE, z);
+    fivebar_real cosine = (REAL(1.0) - REAL(0.5) * z) + (z * z) * POLYNOMIAL(COSINE, z);
+    fivebar_real c = quarters & 1 ? sine : cosine;
+    fivebar_real s = quarters & 1 ? cosine : sine;
+
+    e[0] = (quarters + 1) & 2 ? -c : c;
+    e[1] = quarters & 2 ? -s : s;
+}
+
+/* Return the direction of (x, z) in (-pi, pi], 0 where both are zero. */
+static fivebar_real direction(fivebar_real z, fivebar_real x)
+{
+    fivebar_real wide = magnitude(x);
+    fivebar_real high = magnitude(z);
+    fivebar_real more = high > wide ? high : wide;
+    fivebar_real less = high > wide ? wide : high;
+    int steep = less > TAN_EIGHTH * more;
+    fivebar_real t;
+    fivebar_real t2;
+    fivebar_real angle;
+
+    if (!(more > REAL(0.0))) {
+        return REAL(0.0);
+    }
+    /* Within an eighth of a turn of the axis or of the diagonal; that is one division either way. */
+    t = (steep ? less - more : less) / (steep ? less + more : more);
+    t2 = t * t;
+    angle = t + (t * t2) * POLYNOMIAL(ARC, t2);
+    /* A float's pi is not pi: its rest is added before the last rounding. */
+    if (steep) {
+        angle = REAL(0.25) * PI + (angle + REAL(0.25) * PI_REST);
+    }
+    if (high > wide) {
+        angle = REAL(0.5) * PI - (angle - REAL(0.5) * PI_REST);
+    }
+    if (x < REAL(0.0)) {
+        angle = PI - (angle - PI_REST);
+    }
+    return z < REAL(0.0) && angle < PI ? -angle : angle;
+}
+
+/* ---- Plane vectors ------------------------------------------------------------------------ */
+
+static fivebar_real cross(const fivebar_real a[2], const fivebar_real b[2])
+{
+    return a[0] * b[1] - a[1] * b[0];
+}
+
+/* Store the product of two complex numbers; the result may not be one of them. */
+static void multiply(const fivebar_real a[2], const fivebar_real b[2], fivebar_real ab[2])
+{
+    ab[0] = a[0] * b[0] - a[1] * b[1];
+    ab[1] = a[0] * b[1] + a[1] * b[0];
+}
+
+static int is_sign(int s)
+{
+    return s == 1 || s == -1;
+}
+
+static int are_finite(const fivebar_real *x, int count)
+{
+    int k;
+
+    for (k = 0; k < count; k++) {
+        if (!is_finite(x[k])) {
+            return 0;
+        }
+    }
+    return 1;
+}
+
+/* ---- A leg -------------------------------------------------------------------------------- */
+
+static void prepare_chain(fivebar_chain *chain, fivebar_real near, fivebar_real far,
+                          fivebar_real slack)
+{
+    fivebar_real inner = magnitude(near - far);
+    fivebar_real outer = near + far;
+    fivebar_real hole = inner > slack ? inner - slack : REAL(0.0);
+    fivebar_real reach = outer + slack;
+
+    chain->inner = inner;
+    chain->outer = outer;
+    chain->low = inner * inner;
+    chain->high = outer * outer;
+    chain->least = hole * hole;
+    chain->most = reach * reach;
+    chain->product = (near - far) * outer;
+}
+
+int fivebar_prepare(fivebar_leg *leg)
+{
+    const fivebar_real lengths[6] = {leg->L1, leg->L2, leg->L3, leg->L4, leg->L5, leg->L6};
+    fivebar_real left = leg->L1 + leg->L2 + leg->L6;
+    fivebar_real right = leg->L4 + leg->L3;
+    fivebar_real size = left > right ? left : right;
+    fivebar_real shortest = REAL(0.001) * size;
+    fivebar_real total = leg->L1 + leg->L2 + leg->L3 + leg->L4 + leg->L5;
+    fivebar_real offset[2];
+    fivebar_real turned[2];
+    fivebar_real radius2;
+    fivebar_real radius;
+    fivebar_real slack;
+    int k;
+
+    if (!are_finite(lengths, 6) || !is_finite(leg->bend) || !is_finite(leg->tilt)) {
+        return FIVEBAR_NOT_FINITE;
+    }
+    if (!is_sign(leg->s_A) || !is_sign(leg->s_E) || !is_sign(leg->assembly)) {
+        return FIVEBAR_BAD_ARGUMENT;
+    }
+    if (!(size >= REAL(1e-4) && size <= REAL(1e3))) {
+        return FIVEBAR_BAD_LEG;
+    }
+    for (k = 0; k < 4; k++) {
+        if (!(lengths[k] >= shortest)) {
+            return FIVEBAR_BAD_LEG;
+        }
+    }
+    if (!(leg->L5 >= REAL(0.0) && leg->L6 >= REAL(0.0))) {
+        return FIVEBAR_BAD_LEG;
+    }
+    /* A closed polygon: no side longer than all others together. */
+    for (k = 0; k < 5; k++) {
+        if (!(lengths[k] <= (total - lengths[k]) * (REAL(1.0) + REAL(8.0) * EPSILON))) {
+            return FIVEBAR_BAD_LEG;
+        }
+    }
+    if (!(magnitude(leg->bend) <= PI && magnitude(leg->tilt) <= PI)) {
+        return FIVEBAR_BAD_LEG;
+    }
+
+    unit(leg->bend, turned);
+    offset[0] = leg->L2 + leg->L6 * turned[0];
+    offset[1] = leg->L6 * turned[1];
+    radius2 = offset[0] * offset[0] + offset[1] * offset[1];
+    /* Without an extension exactly L2, which the root of its square may miss. */
+    radius = leg->L6 > REAL(0.0) ? square_root(radius2) : leg->L2;
+    if (!(radius >= shortest)) {
+        return FIVEBAR_BAD_LEG;
+    }
+
+    unit(leg->tilt, turned);
+    leg->A[0] = -(REAL(0.5) * leg->L5) * turned[0];
+    leg->A[1] = -(REAL(0.5) * leg->L5) * turned[1];
+    leg->foot[0] = offset[0] / leg->L2;
+    leg->foot[1] = offset[1] / leg->L2;
+    leg->back[0] = leg->L6 > REAL(0.0) ? leg->L2 * offset[0] / radius2 : REAL(1.0);
+    leg->back[1] = leg->L6 > REAL(0.0) ? -(leg->L2 * offset[1]) / radius2 : REAL(0.0);
+    /* As far as joints are off by rounding: an end of reach that is meant exactly still counts. */
+    slack = REAL(4.0) * EPSILON * (size + leg->L5);
+    prepare_chain(&leg->to_foot, leg->L1, radius, slack);
+    prepare_chain(&leg->to_C, leg->L4, leg->L3, slack);
+    prepare_chain(&leg->knee_knee, leg->L2, leg->L3, slack);
+    leg->apart2 = (REAL(4.0) * slack) * (REAL(4.0) * slack);
+    return FIVEBAR_OK;
+}
+
+/* ---- Angles from the foot ----------------------------------------------------------------- */
+
+/* |r|^2 up to which a chain ends on its motor [m^2]: far below any rounding of a position. */
+#define ON_MOTOR REAL(1e-30)
+
+static int spans(const fivebar_chain *chain, fivebar_real d2)
+{
+    return d2 >= chain->least && d2 <= chain->most;
+}
+
+/* Store the direction of the link at the motor, 2 near |r|^2 long, and |r|^2, for a chain that ends
+ * at r from its motor: the law of cosines, added as directions. */
+static int crank(const fivebar_chain *chain, const fivebar_real r[2], int s, fivebar_real e[2],
+                 fivebar_real *d2)
+{
+    fivebar_real square = r[0] * r[0] + r[1] * r[1];
+    fivebar_real n = square + chain->product;
+    fivebar_real p = (chain->high - square) * (square - chain->low);
+    fivebar_real root;
+
+    if (!spans(chain, square)) {
+        return FIVEBAR_UNREACHABLE;
+    }
+    *d2 = square;
+    if (square < ON_MOTOR) {
+        e[0] = REAL(1.0);
+        e[1] = REAL(0.0);
+        return FIVEBAR_OK;
+    }
+    root = (fivebar_real)s * square_root(p > REAL(0.0) ? p : REAL(0.0));
+    e[0] = r[0] * n - r[1] * root;
+    e[1] = r[1] * n + r[0] * root;
+    return FIVEBAR_OK;
+}
+
+/* Store the directions of both cranks, of any length above 0. */
+static int cranks(const fivebar_leg *leg, const fivebar_real foot[2], int s_A, int s_E,
+                  fivebar_real e_A[2], fivebar_real e_E[2])
+{
+    fivebar_real AF[2];
+    fivebar_real EC[2];
+    fivebar_real d2;
+    int status;
+
+    AF[0] = foot[0] - leg->A[0];
+    AF[1] = foot[1] - leg->A[1];
+    status = crank(&leg->to_foot, AF, s_A, e_A, &d2);
+    if (status != FIVEBAR_OK) {
+        return status;
+    }
+    /* E is at -A. */
+    EC[0] = foot[0] + leg->A[0];
+    EC[1] = foot[1] + leg->A[1];
+    /* With an extension E's side ends at C, which is known once side A has placed L2. */
+    if (leg->L6 > REAL(0.0)) {
+        fivebar_real AB[2];
+        fivebar_real BF[2];
+        fivebar_real BC[2];
+
+        AB[0] = d2 < ON_MOTOR ? leg->L1 : e_A[0] / (REAL(2.0) * d2);
+        AB[1] = d2 < ON_MOTOR ? REAL(0.0) : e_A[1] / (REAL(2.0) * d2);
+        BF[0] = AF[0] - AB[0];
+        BF[1] = AF[1] - AB[1];
+        multiply(leg->back, BF, BC);
+        EC[0] = (AB[0] + BC[0]) + REAL(2.0) * leg->A[0];
+        EC[1] = (AB[1] + BC[1]) + REAL(2.0) * leg->A[1];
+    }
+    return crank(&leg->to_C, EC, s_E, e_E, &d2);
+}
+
+int fivebar_inverse(const fivebar_leg *leg, const fivebar_real foot[2], int s_A, int s_E,
+                    fivebar_real theta[2])
+{
+    fivebar_real e_A[2];
+    fivebar_real e_E[2];
+    int status;
+
+    if (!are_finite(foot, 2)) {
+        return FIVEBAR_NOT_FINITE;
+    }
+    if (!is_sign(s_A) || !is_sign(s_E)) {
+        return FIVEBAR_BAD_ARGUMENT;
+    }
+    status = cranks(leg, foot, s_A, s_E, e_A, e_E);
+    if (status != FIVEBAR_OK) {
+        return status;
+    }
+    theta[0] = direction(e_A[1], e_A[0]);
+    theta[1] = direction(e_E[1], e_E[0]);
+    return FIVEBAR_OK;
+}
+
+int fivebar_inverse_all(const fivebar_leg *leg, const fivebar_real foot[2],
+                        fivebar_real theta[4][2], int status[4])
+{
+    int own = (leg->s_A > 0 ? 2 : 0) + (leg->s_E > 0 ? 1 : 0);
+    int k;
+
+    for (k = 0; k < 4; k++) {
+        status[k] = fivebar_inverse(leg, foot, k & 2 ? 1 : -1, k & 1 ? 1 : -1, theta[k]);
+    }
+    for (k = 0; k < 4; k++) {
+        if (status[k] == FIVEBAR_OK) {
+            return FIVEBAR_OK;
+        }
+    }
+    return status[own];
+}
+
+static int check_angles(const fivebar_real theta[2])
+{
+    if (!are_finite(theta, 2)) {
+        return FIVEBAR_NOT_FINITE;
+    }
+    if (!(magnitude(theta[0]) <= LARGEST_ANGLE &&
+          magnitude(theta[1]) <= LARGEST_ANGLE)) {
+        return FIVEBAR_OUT_OF_LIMITS;
+    }
+    return FIVEBAR_OK;
+}
+
+int fivebar_inverse_nearest(const fivebar_leg *leg, const fivebar_real foot[2],
+                            const fivebar_real now[2], fivebar_real theta[2])
+{
+    fivebar_real every[4][2];
+    fivebar_real nearest[2] = {REAL(0.0), REAL(0.0)};
+    fivebar_real least = REAL(-1.0);
+    int each[4];
+    int status = check_angles(now);
+    int k;
+
+    if (status != FIVEBAR_OK) {
+        return status;
+    }
+    status = fivebar_inverse_all(leg, foot, every, each);
+    if (status != FIVEBAR_OK) {
+        return status;
+    }
+    for (k = 0; k < 4; k++) {
+        if (each[k] == FIVEBAR_OK) {
+            fivebar_real step_A = within_turn(every[k][0] - now[0]);
+            fivebar_real step_E = within_turn(every[k][1] - now[1]);
+            fivebar_real cost = step_A * step_A + step_E * step_E;
+
+            if (least < REAL(0.0) || cost < least) {
+                least = cost;
+                nearest[0] = now[0] + step_A;
+                nearest[1] = now[1] + step_E;
+            }
+        }
+    }
+    theta[0] = nearest[0];
+    theta[1] = nearest[1];
+    return FIVEBAR_OK;
+}
+
+/* ---- Positions from angles ---------------------------------------------------------------- */
+
+typedef struct {
+    fivebar_real AB[2];
+    fivebar_real ED[2];
+    fivebar_real BD[2];
+    fivebar_real BC[2];
+} pose;
+
+/* Store the vectors of a pose: C is the crossing of the circles about B and D. */
+static int close_loop(const fivebar_leg *leg, const fivebar_real theta[2], int assembly, pose *p)
+{
+    fivebar_real d2;
+    fivebar_real q;
+    fivebar_real along;
+    fivebar_real across;
+    int status = check_angles(theta);
+
+    if (status != FIVEBAR_OK) {
+        return status;
+    }
+    if (!is_sign(assembly)) {
+        return FIVEBAR_BAD_ARGUMENT;
+    }
+    unit(theta[0], p->AB);
+    unit(theta[1], p->ED);
+    p->AB[0] *= leg->L1;
+    p->AB[1] *= leg->L1;
+    p->ED[0] *= leg->L4;
+    p->ED[1] *= leg->L4;
+    /* AE is -2 A. */
+    p->BD[0] = (p->ED[0] - p->AB[0]) - REAL(2.0) * leg->A[0];
+    p->BD[1] = (p->ED[1] - p->AB[1]) - REAL(2.0) * leg->A[1];
+    d2 = p->BD[0] * p->BD[0] + p->BD[1] * p->BD[1];
+    if (!(spans(&leg->knee_knee, d2) && d2 > leg->apart2)) {
+        return FIVEBAR_LOOP_OPEN;
+    }
+    q = (leg->knee_knee.high - d2) * (d2 - leg->knee_knee.low);
+    along = (d2 + leg->knee_knee.product) / (REAL(2.0) * d2);
+    across = square_root(q > REAL(0.0) ? q : REAL(0.0)) / (REAL(2.0) * d2);
+    across = (fivebar_real)assembly * across;
+    p->BC[0] = along * p->BD[0] - across * p->BD[1];
+    p->BC[1] = along * p->BD[1] + across * p->BD[0];
+    return FIVEBAR_OK;
+}
+
+int fivebar_joints(const fivebar_leg *leg, const fivebar_real theta[2], int assembly,
+                   fivebar_points *points)
+{
+    pose p;
+    fivebar_real BF[2];
+    int status = close_loop(leg, theta, assembly, &p);
+    int k;
+
+    if (status != FIVEBAR_OK) {
+        return status;
+    }
+    multiply(leg->foot, p.BC, BF);
+    for (k = 0; k < 2; k++) {
+        points->B[k] = leg->A[k] + p.AB[k];
+        points->C[k] = points->B[k] + p.BC[k];
+        points->D[k] = p.ED[k] - leg->A[k];
+        points->F[k] = points->B[k] + BF[k];
+    }
+    return FIVEBAR_OK;
+}
+
+int fivebar_forward(const fivebar_leg *leg, const fivebar_real theta[2], int assembly,
+                    fivebar_real foot[2])
+{
+    fivebar_points points;
+    int status = fivebar_joints(leg, theta, assembly, &points);
+
+    if (status != FIVEBAR_OK) {
+        return status;
+    }
+    foot[0] = points.F[0];
+    foot[1] = points.F[1];
+    return FIVEBAR_OK;
+}
+
+int fivebar_knees(const fivebar_leg *leg, const fivebar_real theta[2], fivebar_real B[2],
+                  fivebar_real D[2])
+{
+    fivebar_real e[2];
+    int status = check_angles(theta);
+
+    if (status != FIVEBAR_OK) {
+        return status;
+    }
+    unit(theta[0], e);
+    B[0] = leg->A[0] + e[0] * leg->L1;
+    B[1] = leg->A[1] + e[1] * leg->L1;
+    unit(theta[1], e);
+    D[0] = e[0] * leg->L4 - leg->A[0];
+    D[1] = e[1] * leg->L4 - leg->A[1];
+    return FIVEBAR_OK;
+}
+
+/* ---- Rates and torques -------------------------------------------------------------------- */
+
+/* Sine of the angle at C below which rounding decides the Jacobian. */
+#ifdef FIVEBAR_DOUBLE
+#define SINGULAR 2.384185791015625e-07
+#else
+#define SINGULAR 0.001953125f
+#endif
+
+/* C moves so that L2 and L3 keep their lengths:
+ *     dC / dtheta_A = (AB x BC) / (BC x DC) (DC_z, -DC_x)
+ *     dC / dtheta_E = (ED x DC) / (BC x DC) (-BC_z, BC_x)
+ * and F = B + foot (C - B), so dF = foot dC + (1 - foot) dB. */
+int fivebar_jacobian(const fivebar_leg *leg, const fivebar_real theta[2], int assembly,
+                     fivebar_real J[2][2])
+{
+    pose p;
+    fivebar_real DC[2];
+    fivebar_real dC[2];
+    fivebar_real dB[2];
+    fivebar_real by_C[2];
+    fivebar_real by_B[2];
+    fivebar_real rest[2];
+    fivebar_real m;
+    fivebar_real turn;
+    int status = close_loop(leg, theta, assembly, &p);
+
+    if (status != FIVEBAR_OK) {
+        return status;
+    }
+    DC[0] = p.BC[0] - p.BD[0];
+    DC[1] = p.BC[1] - p.BD[1];
+    m = cross(p.BC, DC);
+    if (!(magnitude(m) > SINGULAR * (leg->L2 * leg->L3))) {
+        return FIVEBAR_SINGULAR;
+    }
+
+    turn = cross(p.AB, p.BC) / m;
+    dC[0] = turn * DC[1];
+    dC[1] = -(turn * DC[0]);
+    dB[0] = -p.AB[1];
+    dB[1] = p.AB[0];
+    rest[0] = REAL(1.0) - leg->foot[0];
+    rest[1] = -leg->foot[1];
+    multiply(leg->foot, dC, by_C);
+    multiply(rest, dB, by_B);
+    J[0][0] = by_C[0] + by_B[0];
+    J[1][0] = by_C[1] + by_B[1];
+
+    turn = cross(p.ED, DC) / m;
+    dC[0] = -(turn * p.BC[1]);
+    dC[1] = turn * p.BC[0];
+    multiply(leg->foot, dC, by_C);
+    J[0][1] = by_C[0];
+    J[1][1] = by_C[1];
+    return FIVEBAR_OK;
+}
+
+int fivebar_torque(const fivebar_leg *leg, const fivebar_real theta[2], int assembly,
+                   const fivebar_real force[2], fivebar_real tau[2])
+{
+    fivebar_real J[2][2];
+    int status;
+
+    if (!are_finite(force, 2)) {
+        return FIVEBAR_NOT_FINITE;
+    }
+    status = fivebar_jacobian(leg, theta, assembly, J);
+    if (status != FIVEBAR_OK) {
+        return status;
+    }
+    tau[0] = -(J[0][0] * force[0] + J[1][0] * force[1]);
+    tau[1] = -(J[0][1] * force[0] + J[1][1] * force[1]);
+    return FIVEBAR_OK;
+}
+
+/* ---- The workspace ------------------------------------------------------------------------ */
+
+static int reaches(const fivebar_leg *leg, const fivebar_real foot[2], int s_A)
+{
+    fivebar_real e_A[2];
+    fivebar_real e_E[2];
+
+    return cranks(leg, foot, s_A, 1, e_A, e_E) == FIVEBAR_OK;
+}
+
+int fivebar_reaches(const fivebar_leg *leg, const fivebar_real foot[2], int s_A)
+{
+    if (!are_finite(foot, 2)) {
+        return FIVEBAR_NOT_FINITE;
+    }
+    if (s_A != 0 && !is_sign(s_A)) {
+        return FIVEBAR_BAD_ARGUMENT;
+    }
+    if ((s_A != 1 && reaches(leg, foot, -1)) || (s_A != -1 && reaches(leg, foot, 1))) {
+        return FIVEBAR_OK;
+    }
+    return FIVEBAR_UNREACHABLE;
+}
+
+typedef struct {
+    const fivebar_leg *leg;
+    const fivebar_real *point; /* that the nearest one is wanted for */
+    fivebar_real best[2];
+    fivebar_real distance2; /* of the best; below 0: none yet */
+} search;
+
+static void consider(search *s, const fivebar_real c[2])
+{
+    fivebar_real x = c[0] - s->point[0];
+    fivebar_real z = c[1] - s->point[1];
+    fivebar_real d2 = x * x + z * z;
+
+    if ((s->distance2 < REAL(0.0) || d2 < s->distance2) && reaches(s->leg, c, 1)) {
+        s->best[0] = c[0];
+        s->best[1] = c[1];
+        s->distance2 = d2;
+    }
+}
+
+/* Consider the points of one chain's two circles in the direction of the point. */
+static void consider_circles(search *s, const fivebar_chain *chain, const fivebar_real centre[2],
+                             const fivebar_real away[2])
+{
+    fivebar_real ray[2];
+    fivebar_real c[2];
+    fivebar_real d;
+    int k;
+
+    ray[0] = s->point[0] - centre[0];
+    ray[1] = s->point[1] - centre[1];
+    d = square_root(ray[0] * ray[0] + ray[1] * ray[1]);
+    /* From the centre every direction is as near. */
+    if (d > REAL(4.0) * EPSILON * chain->outer) {
+        ray[0] = ray[0] / d;
+        ray[1] = ray[1] / d;
+    } else {
+        ray[0] = away[0];
+        ray[1] = away[1];
+    }
+    for (k = chain->least > REAL(0.0) ? 0 : 1; k < 2; k++) {
+        fivebar_real radius = k == 0 ? chain->inner : chain->outer;
+
+        c[0] = centre[0] + radius * ray[0];
+        c[1] = centre[1] + radius * ray[1];
+        consider(s, c);
+    }
+}
+
+/* Consider the two crossings of a circle about A with one about E. */
+static void consider_corners(search *s, fivebar_real r_A, fivebar_real r_E)
+{
+    const fivebar_real *A = s->leg->A;
+    fivebar_real d = s->leg->L5;
+    fivebar_real sum = r_A + r_E;
+    fivebar_real gap = r_A - r_E;
+    fivebar_real h2 = ((sum - d) * (sum + d)) * ((d - gap) * (d + gap));
+    fivebar_real a = REAL(0.5) * d + sum * gap / (REAL(2.0) * d);
+    fivebar_real h = square_root(h2 > REAL(0.0) ? h2 : REAL(0.0)) / (REAL(2.0) * d);
+    fivebar_real c[2];
+    int side;
+
+    for (side = -1; side <= 1; side += 2) {
+        fivebar_real across = (fivebar_real)side * h;
+        fivebar_real u[2];
+
+        u[0] = REAL(-2.0) * A[0] / d;
+        u[1] = REAL(-2.0) * A[1] / d;
+        c[0] = A[0] + (a * u[0] - across * u[1]);
+        c[1] = A[1] + (a * u[1] + across * u[0]);
+        consider(s, c);
+    }
+}
+
+/* The boundary is made of arcs of the chains' circles, which end in corners, so the nearest point
+ * is the foot of a perpendicular on a circle, or a corner. */
+int fivebar_nearest(const fivebar_leg *leg, const fivebar_real foot[2], fivebar_real nearest[2])
+{
+    search s;
+    fivebar_real E[2];
+    fivebar_real away_A[2];
+    fivebar_real away_E[2];
+    int coaxial = !(leg->L5 > REAL(0.0));
+    int status = fivebar_reaches(leg, foot, 0);
+    int k;
+
+    if (status == FIVEBAR_NOT_FINITE) {
+        return status;
+    }
+    if (status == FIVEBAR_OK) {
+        nearest[0] = foot[0];
+        nearest[1] = foot[1];
+        return FIVEBAR_OK;
+    }
+    if (leg->L6 > REAL(0.0)) {
+        return FIVEBAR_NO_ANSWER;
+    }
+
+    s.leg = leg;
+    s.point = foot;
+    s.best[0] = REAL(0.0);
+    s.best[1] = REAL(0.0);
+    s.distance2 = REAL(-1.0);
+    E[0] = -leg->A[0];
+    E[1] = -leg->A[1];
+    /* Of a point on a motor: away from the other one; down if they are coaxial. */
+    away_A[0] = coaxial ? REAL(0.0) : REAL(2.0) * leg->A[0] / leg->L5;
+    away_A[1] = coaxial ? REAL(-1.0) : REAL(2.0) * leg->A[1] / leg->L5;
+    away_E[0] = coaxial ? REAL(0.0) : -away_A[0];
+    away_E[1] = coaxial ? REAL(-1.0) : -away_A[1];
+    consider_circles(&s, &leg->to_foot, leg->A, away_A);
+    consider_circles(&s, &leg->to_C, E, away_E);
+    for (k = 0; k < 4 && !coaxial; k++) {
+        if (((k & 2) || leg->to_foot.least > REAL(0.0)) &&
+            ((k & 1) || leg->to_C.least > REAL(0.0))) {
+            consider_corners(&s, k & 2 ? leg->to_foot.outer : leg->to_foot.inner,
+                             k & 1 ? leg->to_C.outer : leg->to_C.inner);
+        }
+    }
+    if (s.distance2 < REAL(0.0)) {
+        return FIVEBAR_UNREACHABLE;
+    }
+    nearest[0] = s.best[0];
+    nearest[1] = s.best[1];
+    return FIVEBAR_OK;
+}
+
+/* ---- The hip ------------------------------------------------------------------------------ */
+
+static int check_hip(const fivebar_hip *hip)
+{
+    if (!is_finite(hip->across) || !is_finite(hip->along)) {
+        return FIVEBAR_NOT_FINITE;
+    }
+    if (!is_sign(hip->side) || (hip->kind != FIVEBAR_SIDE_STEP && hip->kind != FIVEBAR_STEERING)) {
+        return FIVEBAR_BAD_ARGUMENT;
+    }
+    return FIVEBAR_OK;
+}
+
+/* With the axis as third coordinate the foot is at (p, q, .) and the leg plane at w from the axis;
+ * u is the foot's coordinate within the plane, across the axis. */
+int fivebar_hip_inverse(const fivebar_leg *leg, const fivebar_hip *hip, const fivebar_real foot[3],
+                        int s_A, int s_E, fivebar_real angles[3])
+{
+    int side_step = hip->kind == FIVEBAR_SIDE_STEP;
+    fivebar_real w = side_step ? -hip->across : hip->across;
+    fivebar_real p = side_step ? foot[2] : foot[0];
+    fivebar_real q = side_step ? -foot[1] : foot[1];
+    fivebar_real r2 = p * p + q * q;
+    fivebar_real r;
+    fivebar_real u2;
+    fivebar_real u;
+    fivebar_real planar[2];
+    fivebar_real theta[2];
+    int status = check_hip(hip);
+
+    if (!are_finite(foot, 3)) {
+        return FIVEBAR_NOT_FINITE;
+    }
+    if (status != FIVEBAR_OK) {
+        return status;
+    }
+    /* Of a far point the square may overflow. */
+    if (!is_finite(r2)) {
+        return FIVEBAR_UNREACHABLE;
+    }
+    r = square_root(r2);
+    u2 = (r - magnitude(w)) * (r + magnitude(w));
+    if (!(u2 >= REAL(-8.0) * EPSILON * (w * w))) {
+        return FIVEBAR_UNREACHABLE;
+    }
+    u = (fivebar_real)hip->side * square_root(u2 > REAL(0.0) ? u2 : REAL(0.0));
+    planar[0] = side_step ? foot[0] : u - hip->along;
+    planar[1] = side_step ? u - hip->along : foot[2];
+    status = fivebar_inverse(leg, planar, s_A, s_E, theta);
+    if (status != FIVEBAR_OK) {
+        return status;
+    }
+    angles[0] = direction(q * u - p * w, p * u + q * w);
+    angles[1] = theta[0];
+    angles[2] = theta[1];
+    return FIVEBAR_OK;
+}
+
+int fivebar_hip_forward(const fivebar_leg *leg, const fivebar_hip *hip,
+                        const fivebar_real angles[3], int assembly, fivebar_real foot[3])
+{
+    fivebar_real phi[2];
+    fivebar_real planar[2];
+    fivebar_real e[2];
+    int status = check_hip(hip);
+
+    phi[0] = angles[0];
+    phi[1] = REAL(0.0);
+    if (status != FIVEBAR_OK) {
+        return status;
+    }
+    status = check_angles(phi);
+    if (status != FIVEBAR_OK) {
+        return status;
+    }
+    status = fivebar_forward(leg, angles + 1, assembly, planar);
+    if (status != FIVEBAR_OK) {
+        return status;
+    }
+    unit(angles[0], e);
+    if (hip->kind == FIVEBAR_SIDE_STEP) {
+        fivebar_real u = hip->along + planar[1];
+
+        foot[0] = planar[0];
+        foot[1] = hip->across * e[0] - u * e[1];
+        foot[2] = hip->across * e[1] + u * e[0];
+    } else {
+        fivebar_real u = hip->along + planar[0];
+
+        foot[0] = u * e[0] - hip->across * e[1];
+        foot[1] = u * e[1] + hip->across * e[0];
+        foot[2] = planar[1];
+    }
+    return FIVEBAR_OK;
+}
+
+/* ---- Servos and gaits --------------------------------------------------------------------- */
+
+/* How far beyond an end of its range a command still counts as on it, in steps. */
+#define TIE REAL(0.0009765625)
+
+static int check_servo(const fivebar_servo *servo)
+{
+    if (!is_finite(servo->offset) || !is_finite(servo->low) || !is_finite(servo->high)) {
+        return FIVEBAR_NOT_FINITE;
+    }
+    if (!is_sign(servo->direction) || !(servo->low < servo->high) ||
+        !(servo->high - servo->low <= REAL(2.0) * PI * (REAL(1.0) + REAL(8.0) * EPSILON))) {
+        return FIVEBAR_BAD_ARGUMENT;
+    }
+    /* Compared without a difference, which might overflow. */
+    if (servo->last <= servo->first || servo->first < -1000000 || servo->last > 1000000) {
+        return FIVEBAR_BAD_ARGUMENT;
+    }
+    return FIVEBAR_OK;
+}
+
+int fivebar_servo_command(const fivebar_servo *servo, fivebar_real theta, int32_t *command)
+{
+    fivebar_real half = REAL(0.5) * (servo->high - servo->low);
+    fivebar_real from_middle = (servo->offset - (servo->low + half)) +
+                               (fivebar_real)servo->direction * theta;
+    fivebar_real span;
+    fivebar_real steps;
+    int32_t whole;
+    int status = check_servo(servo);
+
+    if (!is_finite(theta)) {
+        return FIVEBAR_NOT_FINITE;
+    }
+    if (status != FIVEBAR_OK) {
+        return status;
+    }
+    if (!(magnitude(from_middle) <= LARGEST_ANGLE)) {
+        return FIVEBAR_OUT_OF_LIMITS;
+    }
+    span = (fivebar_real)(servo->last - servo->first);
+    /* The whole turn that is nearest to mid-range: no other can be within it. */
+    steps = (within_turn(from_middle) + half) * (span / (servo->high - servo->low));
+    if (!(steps >= -TIE && steps <= span + TIE)) {
+        return FIVEBAR_OUT_OF_LIMITS;
+    }
+    whole = (int32_t)(steps + REAL(0.5));
+    *command = servo->first + whole;
+    return FIVEBAR_OK;
+}
+
+int fivebar_servo_angle(const fivebar_servo *servo, int32_t command, fivebar_real *theta)
+{
+    fivebar_real span;
+    fivebar_real angle;
+    int status = check_servo(servo);
+
+    if (status != FIVEBAR_OK) {
+        return status;
+    }
+    if (command < servo->first || command > servo->last) {
+        return FIVEBAR_OUT_OF_LIMITS;
+    }
+    span = (fivebar_real)(servo->last - servo->first);
+    angle = (servo->low - servo->offset) +
+            (fivebar_real)(command - servo->first) * ((servo->high - servo->low) / span);
+    if (!(magnitude(angle) <= LARGEST_ANGLE)) {
+        return FIVEBAR_OUT_OF_LIMITS;
+    }
+    angle = within_turn((fivebar_real)servo->direction * angle);
+    *theta = angle <= -PI || angle > PI ? PI : angle;
+    return FIVEBAR_OK;
+}
+
+int fivebar_gait_at(const fivebar_gait *gait, fivebar_real phase, fivebar_real theta[2])
+{
+    fivebar_real place;
+    int32_t row;
+    int32_t next;
+    int k;
+
+    if (!is_finite(phase)) {
+        return FIVEBAR_NOT_FINITE;
+    }
+    if (gait->rows < 2) {
+        return FIVEBAR_BAD_ARGUMENT;
+    }
+    if (gait->periodic) {
+        if (!(magnitude(phase) <= REAL(1e6))) {
+            return FIVEBAR_OUT_OF_LIMITS;
+        }
+        phase = phase - (fivebar_real)(int32_t)phase;
+        phase = phase < REAL(0.0) ? phase + REAL(1.0) : phase;
+        place = phase * (fivebar_real)gait->rows;
+        /* Both may round up to the next period. */
+        place = place < (fivebar_real)gait->rows ? place : REAL(0.0);
+    } else {
+        if (!(phase >= REAL(0.0) && phase <= REAL(1.0))) {
+            return FIVEBAR_OUT_OF_LIMITS;
+        }
+        place = phase * (fivebar_real)(gait->rows - 1);
+    }
+    row = (int32_t)place;
+    next = row + 1 < gait->rows ? row + 1 : gait->periodic ? 0 : row;
+    place = place - (fivebar_real)row;
+    for (k = 0; k < 2; k++) {
+        theta[k] = gait->theta[row][k] + place * (gait->theta[next][k] - gait->theta[row][k]);
+    }
+    return FIVEBAR_OK;
+}
+
+/* ---- The exported leg: classic ------------------------------------------------------------ */
+
+const fivebar_leg FIVEBAR_LEG = {
+#ifdef FIVEBAR_DOUBLE
+    0.040000000000000001, 0.059999999999999998, 0.059999999999999998, 0.040000000000000001, 0.029999999999999999, 0.0, /* L1..L6 [m] */
+    0.0, 0.0, /* bend, tilt [rad] */
+    -1, 1, -1, /* s_A, s_E, assembly */
+    {-0.014999999999999999, -0.0}, /* A */
+    {1.0, 0.0}, /* foot */
+    {1.0, 0.0}, /* back */
+    {0.019999999999999997, 0.10000000000000001, 0.00039999999999999986, 0.010000000000000002, 0.0003999999999999953, 0.010000000000000023, -0.0019999999999999996}, /* to_foot */
+    {0.019999999999999997, 0.10000000000000001, 0.00039999999999999986, 0.010000000000000002, 0.0003999999999999953, 0.010000000000000023, -0.0019999999999999996}, /* to_C */
+    {0.0, 0.12, 0.0, 0.0144, 0.0, 0.014400000000000026, 0.0}, /* knee_knee */
+    2.1330798877176162e-31 /* apart2 */
+#else
+    0.0399999991f, 0.0599999987f, 0.0599999987f, 0.0399999991f, 0.0299999993f, 0.0f, /* L1..L6 [m] */
+    0.0f, 0.0f, /* bend, tilt [rad] */
+    -1, 1, -1, /* s_A, s_E, assembly */
+    {-0.0149999997f, -0.0f}, /* A */
+    {1.0f, 0.0f}, /* foot */
+    {1.0f, 0.0f}, /* back */
+    {0.0199999996f, 0.099999994f, 0.00039999999f, 0.00999999885f, 0.000399997516f, 0.010000011f, -0.00199999986f}, /* to_foot */
+    {0.0199999996f, 0.099999994f, 0.00039999999f, 0.00999999885f, 0.000399997516f, 0.010000011f, -0.00199999986f}, /* to_C */
+    {0.0f, 0.119999997f, 0.0f, 0.0143999998f, 0.0f, 0.0144000137f, 0.0f}, /* knee_knee */
+    6.1481839e-14f /* apart2 */
+#endif
+};
