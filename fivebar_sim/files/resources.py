@@ -10,7 +10,7 @@ PACKAGE = Path(__file__).resolve().parents[1]
 
 @cache
 def folder(name: str) -> Path:
-    """Return the shipped folder called name ("models" or "scenarios").
+    """Return the shipped folder called name ("models", "scenarios", ...).
 
     Raises:
         FileNotFoundError: If the installation lacks it.

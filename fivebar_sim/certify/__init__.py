@@ -1,0 +1,1 @@
+"""Certify a leg controller, in any language, against the answers in `conformance/`."""
