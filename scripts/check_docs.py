@@ -51,7 +51,10 @@ from shown import (
 )
 
 ROOT = Path(__file__).resolve().parent.parent
-COPIED = ("docs", "examples", "models", "scenarios", "scripts", "tests", "pyproject.toml")
+COPIED = (
+    *("docs", "examples", "models", "scenarios", "conformance", "scripts", "tests"),
+    "pyproject.toml",
+)
 CODE = re.compile(r"`[^`]+`")
 DECIMAL = re.compile(r"\d\.\d")
 

@@ -18,7 +18,7 @@ LEVELS = (
     "links",
     "geometry integrator paths",
     "kinematics",
-    "analysis dynamics workspace",
+    "analysis certify dynamics workspace",
     "metrics motion",
     "control",
     "scenario fivebar_controllers",

@@ -28,6 +28,7 @@ COMMANDS = {
     "render": "Draw a run: leg, target path, the foot's trail, the ground's force.",
     "view": "Open MuJoCo's viewer: a scenario's run, or a leg moved by sliders.",
     "workspace": "Draw what a leg's foot can reach, and how deep inside it is.",
+    "certify": "Check any program that computes a leg against known answers.",
 }
 """The commands, each with the first line of its help.
 
@@ -47,6 +48,9 @@ FEWEST = 40
 
 SAFE = "PYTHONSAFEPATH"
 """The variable with which Python imports nothing from the folder that it is started in."""
+
+_before: dict[str, str | None] = {}
+"""What `_environment` changed, and what it was before."""
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -73,15 +77,23 @@ def _needed() -> dict[str, str]:
 @contextmanager
 def _environment(changes: Mapping[str, str]) -> Iterator[None]:
     """Have other environment variables within."""
-    before = {name: os.environ.get(name) for name in changes}
+    _before.update({name: os.environ.get(name) for name in changes})
     os.environ.update(changes)
     try:
         yield
     finally:
-        for name, value in before.items():
+        theirs = user_environment()
+        _before.clear()
+        for name in changes:
             os.environ.pop(name, None)
-            if value is not None:
-                os.environ[name] = value
+            if name in theirs:
+                os.environ[name] = theirs[name]
+
+
+def user_environment() -> dict[str, str]:
+    """Return the environment as the user has it, for a program of the user's own."""
+    kept = {name: value for name, value in os.environ.items() if name not in _before}
+    return kept | {name: value for name, value in _before.items() if value is not None}
 
 
 def _main(args: list[str]) -> int:
