@@ -23,6 +23,7 @@ COMMANDS = {
     "run": "Simulate scenarios, check their limits, write run directories.",
     "check": "Check scenarios against limits, guards and recorded baselines.",
     "converge": "Show which metrics a scenario's timestep already gets right.",
+    "sweep": "Simulate a scenario for all values of some of its keys.",
     "replay": "Open the recordings of runs in the Rerun viewer, on this machine.",
     "report": "Explain a run, or compare several, on one self-contained HTML page.",
     "render": "Draw a run: leg, target path, the foot's trail, the ground's force.",
