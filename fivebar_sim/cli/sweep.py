@@ -43,9 +43,9 @@ def sweep(
 ) -> int:
     """Simulate a scenario for all values of some of its keys.
 
-    DIR/runs.parquet gets a row a run: the varied keys, every metric in SI units, the verdict, and the limits and guards
-    that do not hold; a point that cannot be run has its error there. Broken off, the same command
-    goes on where it was. Exit status 1 if no point could be run.
+    DIR/runs.parquet gets a row a run: the varied keys, every metric in SI units, the verdict, and
+    the limits and guards that do not hold; a point that cannot be run has its error there. Broken
+    off, the same command goes on where it was. Exit status 1 if no point could be run.
 
     Args:
         scenario: Name of a shipped scenario, or path of a TOML file.

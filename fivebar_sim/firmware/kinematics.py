@@ -134,9 +134,7 @@ def reaches(leg: Leg, foot: ArrayLike, s_A: ArrayLike = 0) -> Statuses:
     )
 
 
-def cranks(
-    leg: Leg, F: Real, s_A: NDArray[Any], s_E: NDArray[Any]
-) -> tuple[Real, Real, Statuses]:
+def cranks(leg: Leg, F: Real, s_A: NDArray[Any], s_E: NDArray[Any]) -> tuple[Real, Real, Statuses]:
     """Return the directions of both cranks, of any length above 0, and statuses.
 
     Args:
@@ -198,9 +196,7 @@ def knees(leg: Leg, theta: ArrayLike) -> tuple[Real, Real, Statuses]:
 def close_loop(leg: Leg, theta: Real, assembly: NDArray[Any]) -> tuple[Loop, Statuses]:
     """Return the vectors of closed poses; C is the crossing of the circles about B and D."""
     kind = theta.dtype.type
-    wrong = then(
-        check_angles(theta), first_of((~_is_sign(assembly), Status.BAD_ARGUMENT))
-    )
+    wrong = then(check_angles(theta), first_of((~_is_sign(assembly), Status.BAD_ARGUMENT)))
     kept = _kept(theta, wrong)
     AB = unit(kept[..., 0]) * leg.L1[..., None]
     ED = unit(kept[..., 1]) * leg.L4[..., None]
