@@ -17,7 +17,7 @@ LEVELS = (
     "arrays checks files units workers",
     "links",
     "geometry integrator paths",
-    "kinematics",
+    "kinematics firmware",
     "analysis certify dynamics workspace",
     "metrics motion",
     "control",

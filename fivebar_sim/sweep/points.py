@@ -11,7 +11,7 @@ import msgspec
 import numpy as np
 
 from fivebar_sim.arrays import Array
-from fivebar_sim.errors import ConfigError
+from fivebar_sim.errors import ConfigError, ExtraError
 from fivebar_sim.sweep.axes import Axis, parse
 
 MOST = 100_000_000
@@ -60,7 +60,12 @@ class Points(msgspec.Struct, frozen=True, dict=True):
     def _sobol(self) -> Array:
         """Where the points of a sample lie, in [0, 1), (sample, axes)."""
         # Slow to import, and only samples need it.
-        from scipy.stats import qmc
+        try:
+            from scipy.stats import qmc
+        except ImportError as error:
+            raise ExtraError(
+                f"a sample needs SciPy ({error}): pip install 'fivebar-sim[precise]'"
+            ) from None
 
         assert self.sample is not None
         size = max(1, math.ceil(math.log2(self.sample)))
