@@ -3,7 +3,12 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
+
+import numpy as np
+
+Scalar = Any
+"""A float, or an array with one value for each of many links."""
 
 
 class Link(NamedTuple):
@@ -16,12 +21,12 @@ class Link(NamedTuple):
         inertia: About the centre of mass, about the axis normal to the leg plane [kg m^2].
     """
 
-    mass: float
-    com: tuple[float, float]
-    inertia: float
+    mass: Scalar
+    com: tuple[Scalar, Scalar]
+    inertia: Scalar
 
 
-def capsule(length: float, radius: float, density: float) -> Link:
+def capsule(length: Scalar, radius: Scalar, density: Scalar) -> Link:
     """Return the inertia of a capsule whose caps are centred on the link's two joints.
 
     Cylinder m_c = rho pi r^2 L and two half balls, together m_s = rho 4/3 pi r^3:
@@ -36,22 +41,23 @@ def capsule(length: float, radius: float, density: float) -> Link:
     return Link(m_c + m_s, (L / 2, 0.0), inertia)
 
 
-def ball(radius: float, density: float) -> Link:
+def ball(radius: Scalar, density: Scalar) -> Link:
     """Return the inertia of a ball about its centre: m = rho 4/3 pi r^3, I = 2/5 m r^2."""
     mass = density * 4.0 / 3.0 * math.pi * radius**3
     return Link(mass, (0.0, 0.0), 0.4 * mass * radius**2)
 
 
-def rod(mass: float, length: float) -> Link:
+def rod(mass: Scalar, length: Scalar) -> Link:
     """Return the inertia of a slender rod between its two joints: I = m L^2 / 12."""
     return Link(mass, (0.5 * length, 0.0), mass * length**2 / 12)
 
 
-def moved(body: Link, at: tuple[float, float], angle: float = 0.0) -> Link:
+def moved(body: Link, at: tuple[Scalar, Scalar], angle: Scalar = 0.0) -> Link:
     """Return a body turned by angle [rad] about its frame's origin, then shifted by `at` [m]."""
     x, y = body.com
-    c = math.cos(angle)
-    s = math.sin(angle)
+    maths: Any = math if isinstance(angle, float) else np
+    c = maths.cos(angle)
+    s = maths.sin(angle)
     return Link(body.mass, (at[0] + c * x - s * y, at[1] + s * x + c * y), body.inertia)
 
 
@@ -59,7 +65,7 @@ def combined(*bodies: Link) -> Link:
     """Return several bodies in one frame as one body, by the parallel axis theorem."""
     mass = sum(b.mass for b in bodies)
     # Without mass there is no centre of mass: any of the bodies is the answer.
-    if mass == 0.0:
+    if np.ndim(mass) == 0 and mass == 0.0:
         return bodies[0]
     x = sum(b.mass * b.com[0] for b in bodies) / mass
     y = sum(b.mass * b.com[1] for b in bodies) / mass

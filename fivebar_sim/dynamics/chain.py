@@ -87,7 +87,7 @@ class Chain:
     """A leg's constants; moments of mass are sums of m times (along, across) in a link's frame.
 
     Attributes:
-        leg: The leg.
+        leg: The leg; or many legs, whose attributes are arrays, as those of the chain are then.
         assembly: +1 or -1.
         I1: Inertia about A of L1, L2's mass at B, and A's rotor [kg m^2].
         I2: Inertia of L2 about B [kg m^2].
@@ -101,12 +101,12 @@ class Chain:
         hung: Moment of mass about O of side A's masses at A and side E's at E, hip frame [kg m].
     """
 
-    leg: FiveBar
-    assembly: int
-    I1: float
-    I2: float
-    I3: float
-    I4: float
+    leg: Any
+    assembly: Scalar
+    I1: Scalar
+    I2: Scalar
+    I3: Scalar
+    I4: Scalar
     S1: Vector
     S2: Vector
     S3: Vector
@@ -131,16 +131,29 @@ class Chain:
             raise ArgumentError(f"assembly must be -1 or 1, got {assembly!r}")
 
         check_number("payload", payload, "kg", low=0.0, high=HEAVIEST)
-        one, two, three, four = leg.links
+        x, z = kinematics.bases(leg)[1].tolist()
+        return cls.assembled(leg, sign, leg.links, (x, z), payload)
+
+    @classmethod
+    def assembled(
+        cls,
+        leg: Any,
+        assembly: Scalar,
+        links: tuple[Link, Link, Link, Link],
+        E: Vector,
+        payload: Scalar,
+    ) -> Chain:
+        """Return the constants of a leg, or of many legs at once, given their links and E [m]."""
+        one, two, three, four = links
         # The foot is part of L2, and so is the payload.
         two = combined(two, Link(payload, leg.foot_offset, 0.0))
-        x, z = kinematics.bases(leg)[1].tolist()
+        x, z = E
         # E = -A, so that the moments of the masses hung there differ in sign only.
         right = three.mass + four.mass - one.mass - two.mass
 
         return cls(
             leg=leg,
-            assembly=sign,
+            assembly=assembly,
             I1=about_joint(one) + two.mass * leg.L1**2 + leg.armature,
             I2=about_joint(two),
             I3=about_joint(three),
@@ -320,6 +333,6 @@ class Chain:
         return 0.5 * turning + H12 * w1 * w2 + H43 * w4 * w3, -lift
 
 
-def about_joint(link: Link) -> float:
+def about_joint(link: Link) -> Scalar:
     """Return the inertia of a link about its inner joint [kg m^2]: I + m |com|^2."""
     return link.inertia + link.mass * (link.com[0] ** 2 + link.com[1] ** 2)
