@@ -30,6 +30,7 @@ LEVELS = (
     "runs environment gym",
     "rollout report vector",
     "regression sweep",
+    "design",
     "cli pytest_plugin",
     "fivebar_sim __main__",
 )

@@ -1,0 +1,1 @@
+"""The evaluation of designs: poses, torques, objectives and constraints on arrays."""
