@@ -72,10 +72,12 @@ class Result(NamedTuple):
     def remarks(self) -> list[str]:
         """Warnings for people, which change no verdict.
 
-        The foot does not follow its path, or numbers owe something to the timestep.
+        The foot does not follow its path, or numbers owe something to the timestep: for that the
+        scenario is run again in shorter steps, each time that this is read. It takes two or three
+        times as long as the run itself, seldom seven times.
         """
         astray = tracking.astray(self.scenario.leg, self.record, self.scenario.window)
-        owed = coarse.warnings(self.scenario, self.record, self.measured.guards)
+        owed = coarse.warnings(self, run)
         return owed if astray is None else [astray, *owed]
 
     def write(self, path: str | Path) -> Path:

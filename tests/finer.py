@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
 
-from fivebar_sim import rollout
+from fivebar_sim import rollout, workspace
 from fivebar_sim.errors import FiveBarError
 from fivebar_sim.metrics import guards
 from fivebar_sim.metrics.catalogue import ABSOLUTE
@@ -49,8 +50,9 @@ NATURAL = {"classic": 2e-5, "extended": 2e-5, "q8bot": 1e-5, "minitaur": 8e-5, "
 """About the lesser inertia that a motor feels [kg m^2]: it makes gains of all legs alike."""
 
 KEYS = (
-    "tracking.rms",
+    *("tracking.rms", "tracking.max"),
     *(f"load.{name}.{motor}" for name in ("torque_rms", "torque_peak") for motor in "AE"),
+    *(f"whole.torque_peak.{motor}" for motor in "AE"),
     "load.share_A",
 )
 """What must not depend on the timestep."""
@@ -91,9 +93,20 @@ def case(seed: int) -> tuple[str, list[str]]:
     else:
         sets += _planned(rng, near, scenario, h)
     if rng.random() < 0.15 and scenario.leg.L6 == 0.0:
-        # Too short for its path, the leg follows the edge of what it reaches.
-        sets += ["path.outside=nearest", f"leg.L1={0.85 * scenario.leg.L1}"]
+        sets += _too_short(scenario)
     return name, sets
+
+
+def _too_short(scenario: Scenario) -> list[str]:
+    """Return settings of a leg that is so short that it follows the edge of what it reaches."""
+    leg = scenario.leg
+    foot = scenario.foot_path
+    shrunk = {}
+    for factor in np.arange(0.98, 0.6, -0.02):
+        shrunk = {link: float(factor) * getattr(leg, link) for link in ("L1", "L2", "L3", "L4")}
+        if not workspace.reachable(dataclasses.replace(leg, **shrunk), foot).all():
+            break
+    return ["path.outside=nearest", *(f"leg.{link}={length}" for link, length in shrunk.items())]
 
 
 def _planned(
@@ -186,7 +199,7 @@ def differences(coarse: Result, fine: Result) -> dict[str, float]:
         now = look_up(fine.metrics, key)
         if was is None or now is None:
             continue
-        small = NEAR * coarse.scenario.leg.size if key == "tracking.rms" else ABSOLUTE[key]
+        small = NEAR * coarse.scenario.leg.size if "tracking" in key else ABSOLUTE[key]
         if abs(was - now) > max(BAR * abs(now), small):
             off[key] = abs(was - now) / abs(now)
     return off

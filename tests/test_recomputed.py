@@ -65,7 +65,7 @@ def test_a_landing_is_in_its_window() -> None:
 def test_tables_fit_80_columns_and_name_the_window() -> None:
     for name, result in shipped.results().items():
         console = Console(width=80, file=io.StringIO())
-        print_result(result, "runs/here", console)
+        print_result(result, [], "runs/here", console)
         assert isinstance(console.file, io.StringIO)
         told = console.file.getvalue()
         assert "\u2026" not in told, name

@@ -163,7 +163,7 @@ def _judge(name: str, result: Result | DivergedError, old: Baseline | None) -> C
     if isinstance(result, DivergedError):
         say(result)
         return comparison.Checked(name, [], str(result).removeprefix(f"{name}: "), [])
-    return comparison.compare(result, old)
+    return comparison.compare(result, old, result.remarks)
 
 
 def _update(

@@ -41,8 +41,15 @@ def verdict(ok: bool) -> str:
     return WORDS["pass" if ok else "fail"]
 
 
-def print_result(result: Result, where: str, console: Console) -> None:
-    """Print one run: its metrics with their limits, the verdict, and the run directory."""
+def print_result(result: Result, remarks: Sequence[str], where: str, console: Console) -> None:
+    """Print one run: its metrics with their limits, the verdict, and the run directory.
+
+    Args:
+        result: The run.
+        remarks: Its warnings.
+        where: Its run directory.
+        console: Where to print it.
+    """
     window = result.measured.window
     scenario = result.scenario
     title = (
@@ -60,8 +67,8 @@ def print_result(result: Result, where: str, console: Console) -> None:
     for said in guards.tripped(result.measured.guards):
         console.print(f"[red]{said}[/red]", soft_wrap=True)
 
-    for remark in result.remarks:
-        console.print(f"[yellow]warning: {remark}[/yellow]", soft_wrap=True)
+    for remark in remarks:
+        console.print(f"[yellow]warning: {escape(remark)}[/yellow]", soft_wrap=True)
 
     console.print(f"verdict: {WORDS[result.verdict]}   written to {escape(where)}", soft_wrap=True)
 

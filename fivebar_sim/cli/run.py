@@ -101,6 +101,8 @@ def _run(
         try:
             with spinner(f"simulating {name}", quiet=quiet):
                 result = _execute(order, viewer, place)
+                # They take further runs: while the spinner turns, and once all is written.
+                remarks = [] if out is None else result.remarks
         # The other scenarios still run.
         except DivergedError as error:
             say(error)
@@ -113,7 +115,7 @@ def _run(
         if out is not None:
             from fivebar_sim.cli import console
 
-            console.print_result(result, str(place), out)
+            console.print_result(result, remarks, str(place), out)
 
     if as_json:
         shown = next(iter(metrics.values()), None) if len(orders) == 1 else metrics

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from fivebar_sim.metrics import guards
@@ -81,8 +81,14 @@ class Checked(NamedTuple):
         return [line, *self.notes] if better else self.notes
 
 
-def compare(result: Result, baseline: Baseline | None) -> Checked:
-    """Compare a run with its limits and its baseline."""
+def compare(result: Result, baseline: Baseline | None, remarks: Sequence[str] = ()) -> Checked:
+    """Compare a run with its limits and its baseline.
+
+    Args:
+        result: The run.
+        baseline: Its baseline, if it has one.
+        remarks: What else is to be said about it: `Result.remarks`, which takes further runs.
+    """
     metrics = result.metrics
     limits = {limit.key: limit for limit in result.limits}
     recorded = baseline.metrics if baseline else {}
@@ -94,7 +100,7 @@ def compare(result: Result, baseline: Baseline | None) -> Checked:
     ]
     broke = _broke(result)
     # Of a run that broke, a missing baseline is the least of its problems.
-    notes = [] if broke else [*result.remarks, *_notes(baseline, metrics)]
+    notes = [] if broke else [*remarks, *_notes(baseline, metrics)]
     return Checked(result.scenario.name, rows, broke, notes)
 
 

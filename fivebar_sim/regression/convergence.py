@@ -20,6 +20,7 @@ from fivebar_sim.integrator import Integrator
 from fivebar_sim.metrics import guards
 from fivebar_sim.metrics.catalogue import ABSOLUTE
 from fivebar_sim.metrics.limits import look_up
+from fivebar_sim.runs.coarse import NUMERICAL
 from fivebar_sim.scenario import Scenario
 from fivebar_sim.scenario.refined import refined
 
@@ -32,9 +33,6 @@ SLOWEST = 0.5
 
 ROUNDING = 1e-9
 """Differences below this part of a value are rounding."""
-
-NUMERICAL = ("closure.rms", "closure.max")
-"""Metrics that are left out: the loop's gap is an error of the step itself, and its limit is 0."""
 
 OTHER: dict[str, Integrator] = {"discrete": "implicitfast", "implicitfast": "discrete"}
 

@@ -1,108 +1,232 @@
-"""Warnings that a run's numbers owe something to its timestep, where no guard fails it for that."""
+"""Warnings that a run's numbers owe something to its timestep, where no guard fails it for that.
+
+A run is taken again at half its timestep and, where that leaves a doubt, at a quarter. What costs
+less is in the record of the run itself, but no such sign saw all runs that were off: they only say
+why, where one of them shows.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any, Protocol
 
 import numpy as np
 
-from fivebar_sim import motion
-from fivebar_sim.arrays import Array
 from fivebar_sim.control import Feedback
-from fivebar_sim.metrics import tracking
-from fivebar_sim.metrics.columns import MOTORS, motors
-from fivebar_sim.metrics.guards import Guard
+from fivebar_sim.errors import FiveBarError
+from fivebar_sim.metrics import guards, tracking
+from fivebar_sim.metrics.catalogue import ABSOLUTE, SHOWN, shown
+from fivebar_sim.metrics.columns import MOTORS, Record, motors
+from fivebar_sim.metrics.limits import Limit, look_up
+from fivebar_sim.metrics.measured import Judged
 from fivebar_sim.scenario import Scenario
+from fivebar_sim.scenario.refined import refined, shortened
 from fivebar_sim.scenario.scenes import Ground
-from fivebar_sim.simulation import sampling
+
+BAR = 0.05
+"""Largest part by which a metric may differ in shorter steps."""
+
+DOUBT = 0.015
+"""The same at half the timestep, from which on a quarter is tried: there it may be above the bar.
+
+An error of first order is half as much again at a quarter, one of order 1/2 seven tenths.
+"""
+
+NEAR = 1e-3
+"""Part of the leg's size by which tracking may differ: fed forward, it is all the step's error."""
+
+LONGEST = 20_000
+"""Steps of a run that are taken again; of a longer one, those that it begins with."""
+
+PARTS = {2: "half", 4: "a quarter"}
+"""Into how many parts a timestep is cut, and what each is of it."""
+
+WATCHED = (
+    *("tracking.rms", "tracking.max"),
+    *(f"load.{name}.{motor}" for name in ("torque_rms", "torque_peak") for motor in MOTORS),
+    *(f"whole.torque_peak.{motor}" for motor in MOTORS),
+    "load.share_A",
+)
+"""Metrics that are compared, besides those that have a limit."""
+
+NUMERICAL = ("closure.rms", "closure.max")
+"""Metrics that are left out: the loop's gap is an error of the step itself, and its limit is 0."""
 
 JOLTED = 0.05
-"""Part of the largest torque that may last a single step before peaks are off by more than that."""
-
-SPRUNG = 0.15
-"""Part of the servos' damping that `discrete` may add to it."""
-
-DAMPED = 0.5
-"""The same of a feedback controller: what it holds for long is less sensitive to it."""
+"""Part of the largest torque that lasts a single step from which on peaks are off because of it."""
 
 OPENED = 0.5
-"""Part of the tracking error that the loop's gap may be."""
+"""The same of the loop's gap, as a part of the tracking error."""
 
-NOTHING = 1e-3
-"""Part of the leg's size that no gap is worth a word below."""
+SPRUNG = 0.15
+"""The same of what `discrete` adds to the servos' damping, as a part of it."""
 
 FIRST = 10
 """Steps in which a run starts: what is held, and perhaps moves, sets in at once."""
 
-CHECK = "`fivebar converge` tells by how much"
+
+class Run(Protocol):
+    """A run and what came of it: `rollout.Result`."""
+
+    @property
+    def scenario(self) -> Scenario:
+        """What was run."""
+        ...
+
+    @property
+    def record(self) -> Record:
+        """The columns of rollout.parquet."""
+        ...
+
+    @property
+    def measured(self) -> Judged:
+        """All of metrics.json, with types."""
+        ...
+
+    @property
+    def metrics(self) -> dict[str, Any]:
+        """The same as nested dictionaries."""
+        ...
+
+    @property
+    def limits(self) -> list[Limit]:
+        """Every limit with its value."""
+        ...
 
 
-def warnings(scenario: Scenario, record: Mapping[str, Array], guards: list[Guard]) -> list[str]:
+def warnings(result: Run, again: Callable[[Scenario], Run]) -> list[str]:
     """Return what a run's numbers owe to its timestep, for people; often nothing.
 
-    A scenario with a table [converge] has been checked, and says so itself.
+    Args:
+        result: The run. One whose guards tripped has failed: nothing more is said about it.
+        again: Runs a scenario.
+    """
+    if guards.tripped(result.measured.guards):
+        return []
+
+    scenario = result.scenario
+    begun = shortened(scenario, LONGEST)
+    first = result if begun is scenario else again(begun)
+    said = "" if begun is scenario else f", in the first {begun.duration:g} s,"
+    for parts, part in PARTS.items():
+        when = f"at {part} of it{said}"
+        try:
+            finer = again(refined(begun, parts, scenario.sim.integrator))
+        except FiveBarError as error:
+            return [f"the timestep is too long: {when} the run ends: {error}"]
+
+        fails = [*guards.tripped(finer.measured.guards), *_flipped(first, finer)]
+        if fails:
+            return [f"the timestep is too long: {when} the run fails: {'; '.join(fails)}"]
+
+        parts_off = differences(scenario, first.metrics, finer.metrics)
+        off = {key: by for key, by in parts_off.items() if by > BAR}
+        if off:
+            named = ", ".join(_named(off, first, finer))
+            why = "".join(f"; {each}" for each in _reasons(first))
+            return [f"numbers depend on the timestep: {when} {named}{why}"]
+        if not any(by > DOUBT for by in parts_off.values()):
+            return []
+    return []
+
+
+def differences(
+    scenario: Scenario, was: Mapping[str, Any], now: Mapping[str, Any]
+) -> dict[str, float]:
+    """Return by how much metrics differ, as a part of the second run's, where it counts.
+
+    It does not where the scenario's table [converge] allows it, or where next to nothing differs.
 
     Args:
         scenario: The scenario that was run.
-        record: The columns of rollout.parquet.
-        guards: The guards of the run: one that tripped says it already.
+        was: The metrics of a run.
+        now: Those of one in shorter steps.
     """
-    if scenario.converge:
-        return []
-    found = (
-        _jolted(guards),
-        _started(scenario, record),
-        _opened(scenario, record),
-        _sprung(scenario),
-        _damped(scenario, record, guards),
-    )
-    return [each for each in found if each is not None]
+    found = {}
+    for key in dict.fromkeys((*WATCHED, *scenario.limits)):
+        before = look_up(was, key)
+        after = look_up(now, key)
+        if before is None or after is None or key in NUMERICAL:
+            continue
+        change = abs(before - after)
+        size = abs(after)
+        near = NEAR * scenario.leg.size if key.startswith("tracking.") else ABSOLUTE.get(key, 0.0)
+        if change > max(near, scenario.converge.get(key, 0.0) * size):
+            found[key] = change / size if size > 0.0 else np.inf
+    return found
 
 
-def _jolted(guards: list[Guard]) -> str | None:
-    """Return the warning that torques last a single step."""
-    jolts = next((guard for guard in guards if guard.name == "jolts"), None)
-    if jolts is None or not jolts.ok or not (jolts.value or 0.0) > JOLTED:
+def _named(off: Mapping[str, float], first: Run, finer: Run) -> Iterator[str]:
+    """Yield what metrics are in shorter steps, and what they were."""
+    seen = set()
+    for key, by in off.items():
+        was = look_up(first.metrics, key)
+        now = look_up(finer.metrics, key)
+        # The whole run's peak is often that of the window.
+        if (was, now) in seen:
+            continue
+        seen.add((was, now))
+        part = f"{100.0 * by:.0f}" if by > 0.1 else f"{100.0 * by:.2g}"
+        yield f"{SHOWN[key][0]} is {shown(key, now)}, not {shown(key, was)} ({part} % off)"
+
+
+def _flipped(first: Run, finer: Run) -> Iterator[str]:
+    """Yield the limits that hold in a run, but not in shorter steps; see `differences`."""
+    allowed = first.scenario.converge
+    for was, now in zip(first.limits, finer.limits, strict=True):
+        if not was.ok or now.ok:
+            continue
+        # An undefined metric differs by more than any part.
+        change = np.inf if now.value is None else abs((was.value or 0.0) - now.value)
+        if change > allowed.get(now.key, 0.0) * abs(now.value or 0.0):
+            yield (
+                f"{SHOWN[now.key][0]} is {shown(now.key, now.value)}, which breaks its limit, not "
+                f"{shown(was.key, was.value)}"
+            )
+
+
+def _reasons(result: Run) -> Iterator[str]:
+    """Yield what in a run may make its numbers depend on the timestep."""
+    found = (_jolted(result), _started(result), _opened(result), _sprung(result))
+    yield from (each for each in found if each is not None)
+
+
+def _jolted(result: Run) -> str | None:
+    """Return that torques last a single step."""
+    jolts = next((each.value for each in result.measured.guards if each.name == "jolts"), None)
+    if jolts is None or not jolts > JOLTED:
         return None
-    part = 100.0 * (jolts.value or 0.0)
-    return (
-        f"torque peaks depend on the timestep: {part:.3g} % of the largest lasted one step; {CHECK}"
-    )
+    return f"{100.0 * jolts:.3g} % of the largest torque lasted one step"
 
 
-def _started(scenario: Scenario, record: Mapping[str, Array]) -> str | None:
-    """Return the warning that the largest torque is that of the start."""
+def _started(result: Run) -> str | None:
+    """Return that the largest torque is that of the start."""
     # A feedback controller holds each torque for a period: it has no step of its own.
-    if isinstance(scenario.controller, Feedback):
+    if isinstance(result.scenario.controller, Feedback):
         return None
-    at = np.abs(motors(record, "torque")).argmax(axis=0)
+    at = np.abs(motors(result.record, "torque")).argmax(axis=0)
     if not (at < FIRST).any():
         return None
     motor = MOTORS[int(at.argmin())]
-    return (
-        f"the largest torque of {motor} is that of the first {FIRST} steps, in which the run "
-        f"starts: it depends on the timestep; {CHECK}"
-    )
+    return f"the largest torque of {motor} is that of the first {FIRST} steps, when the run starts"
 
 
-def _opened(scenario: Scenario, record: Mapping[str, Array]) -> str | None:
-    """Return the warning that tracking is no better than the loop's gap."""
-    window = scenario.window
-    gap = tracking.gap_rms(scenario.leg, record, window)
-    error = tracking.rms(scenario.leg, record, window)
-    if not gap > max(OPENED * error, NOTHING * scenario.leg.size):
+def _opened(result: Run) -> str | None:
+    """Return that tracking is no better than the loop's gap."""
+    scenario = result.scenario
+    gap = tracking.gap_rms(scenario.leg, result.record, scenario.window)
+    error = tracking.rms(scenario.leg, result.record, scenario.window)
+    if not gap > max(OPENED * error, NEAR * scenario.leg.size):
         return None
-    return (
-        f"tracking depends on the timestep: the loop is open by {1e3 * gap:.3g} mm, of an error "
-        f"of {1e3 * error:.3g} mm; {CHECK}"
-    )
+    return f"the loop is open by {1e3 * gap:.3g} mm, of an error of {1e3 * error:.3g} mm"
 
 
-def _sprung(scenario: Scenario) -> str | None:
-    """Return the warning that the step damps the servos' springs, which jerks and contacts load.
+def _sprung(result: Run) -> str | None:
+    """Return that the step damps the servos' springs, which jerks and contacts load.
 
     Under `discrete` a spring acts with the angle that a step ends in: as if kd were kp h larger.
     """
+    scenario = result.scenario
     sim = scenario.sim
     servo = scenario.servo
     if isinstance(scenario.controller, Feedback) or sim.integrator != "discrete":
@@ -113,38 +237,5 @@ def _sprung(scenario: Scenario) -> str | None:
     if not jerked or not added > SPRUNG * servo.damping:
         return None
     return (
-        f"torques of jerks depend on the timestep: kp h = {added:.3g} N m s/rad adds to the "
-        f"servos' damping of {servo.damping:.3g} N m s/rad; {CHECK}"
-    )
-
-
-def _damped(scenario: Scenario, record: Mapping[str, Array], guards: list[Guard]) -> str | None:
-    """Return the warning that the step damps the motion under a feedback controller."""
-    if not all(guard.ok for guard in guards if guard.name == "feedback"):
-        return None
-    if not isinstance(scenario.controller, Feedback):
-        return None
-    h = scenario.sim.timestep
-    force = scenario.foot_force
-    wanted = motion.plan(
-        scenario.leg, scenario.path, scenario.steps, h, force=force, payload=scenario.payload
-    )
-    theta = motors(record, "theta")
-    # On the ground too: the leg's own inertia is what a light damper has to stop there.
-    free = np.zeros(scenario.steps, dtype=bool)
-    found = sampling.stability(scenario, wanted, theta, motors(record, "theta_dot"), free)
-    if found is None:
-        return None
-
-    settles = found.shown < 0.0
-    if not settles.any():
-        return None
-    real = float(np.median(found.real[settles]))
-    shown = float(np.median(found.shown[settles]))
-    if not -shown > (1.0 + DAMPED) * max(-real, 0.0):
-        return None
-    really = "die out" if real < 0.0 else "grow"
-    return (
-        f"the timestep damps the feedback: errors die out at {-shown:.3g}/s, with shorter ones "
-        f"they {really} at {abs(real):.3g}/s; {CHECK}"
+        f"kp h = {added:.3g} N m s/rad adds to the servos' damping of {servo.damping:.3g} N m s/rad"
     )

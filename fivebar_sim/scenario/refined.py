@@ -51,3 +51,21 @@ def _whole(seconds: float, timestep: float) -> float:
     # Within rounding it is whole already: its last bits are the scenario's.
     steps = round(min(seconds / timestep, MOST_STEPS))
     return seconds if math.isclose(seconds, steps * timestep) else steps * timestep
+
+
+def shortened(scenario: Scenario, steps: int) -> Scenario:
+    """Return the beginning of an experiment: some steps, or as many as it takes to measure any.
+
+    Args:
+        scenario: The experiment; one that is no longer is returned itself.
+        steps: Of the same timestep.
+    """
+    path = scenario.path
+    h = scenario.sim.timestep
+    # A period after the ramp; a path without one is measured from the ramp's end on.
+    least = path.ramp + (path.period if path.period is not None else path.ramp)
+    # 1e-9: rounding must not make it a step longer.
+    duration = h * max(steps, math.ceil(least / h * (1.0 - 1e-9)))
+    if duration >= scenario.duration:
+        return scenario
+    return msgspec.structs.replace(scenario, duration=duration)
