@@ -92,6 +92,12 @@ static fivebar_real horner(const fivebar_real *c, int count, fivebar_real z)
     return sum;
 }
 
+static int is_finite(fivebar_real x)
+{
+    /* NaN and infinity less themselves are NaN. */
+    return x - x == REAL(0.0);
+}
+
 /* The square root as one instruction, which IEEE 754 rounds correctly; a call of sqrtf would pull in
  * libm and errno. Without such an instruction it is found digit by digit. */
 #if defined(FIVEBAR_SQRT_BY_DIGITS)
@@ -143,6 +149,9 @@ static fivebar_real square_root(fivebar_real x)
     if (!(x > REAL(0.0))) {
         return REAL(0.0);
     }
+    if (!is_finite(x)) {
+        return x;
+    }
     /* Powers of two are exact: x becomes 1 .. 4, and its digits a whole number. */
     while (x < REAL(1.0)) {
         x *= REAL(4.0);
@@ -169,12 +178,6 @@ static fivebar_real square_root(fivebar_real x)
     }
     return (fivebar_real)((root + 1) >> 1) * (scale / (fivebar_real)((digits)1 << (MANTISSA - 1)));
 #endif
-}
-
-static int is_finite(fivebar_real x)
-{
-    /* NaN and infinity less themselves are NaN. */
-    return x - x == REAL(0.0);
 }
 
 static fivebar_real magnitude(fivebar_real x)
@@ -726,19 +729,21 @@ typedef struct {
     const fivebar_leg *leg;
     const fivebar_real *point; /* that the nearest one is wanted for */
     fivebar_real best[2];
-    fivebar_real distance2; /* of the best; below 0: none yet */
+    int found; /* whether there is a best one yet */
 } search;
 
+/* Take a candidate that is nearer than the best one: |p - best|^2 - |p - c|^2 as one product, which
+ * keeps its digits where p is far away. */
 static void consider(search *s, const fivebar_real c[2])
 {
-    fivebar_real x = c[0] - s->point[0];
-    fivebar_real z = c[1] - s->point[1];
-    fivebar_real d2 = x * x + z * z;
+    const fivebar_real *p = s->point;
+    fivebar_real x = (c[0] - s->best[0]) * ((p[0] - s->best[0]) + (p[0] - c[0]));
+    fivebar_real z = (c[1] - s->best[1]) * ((p[1] - s->best[1]) + (p[1] - c[1]));
 
-    if ((s->distance2 < REAL(0.0) || d2 < s->distance2) && reaches(s->leg, c, 1)) {
+    if ((!s->found || x + z > REAL(0.0)) && reaches(s->leg, c, 1)) {
         s->best[0] = c[0];
         s->best[1] = c[1];
-        s->distance2 = d2;
+        s->found = 1;
     }
 }
 
@@ -796,6 +801,9 @@ static void consider_corners(search *s, fivebar_real r_A, fivebar_real r_E)
     }
 }
 
+/* Coordinates from here on have no nearest point [m]. */
+#define FARTHEST REAL(1e6)
+
 /* The boundary is made of arcs of the chains' circles, which end in corners, so the nearest point
  * is the foot of a perpendicular on a circle, or a corner. */
 int fivebar_nearest(const fivebar_leg *leg, const fivebar_real foot[2], fivebar_real nearest[2])
@@ -819,12 +827,16 @@ int fivebar_nearest(const fivebar_leg *leg, const fivebar_real foot[2], fivebar_
     if (leg->L6 > REAL(0.0)) {
         return FIVEBAR_NO_ANSWER;
     }
+    /* Squares must not overflow. */
+    if (!(magnitude(foot[0]) <= FARTHEST && magnitude(foot[1]) <= FARTHEST)) {
+        return FIVEBAR_OUT_OF_LIMITS;
+    }
 
     s.leg = leg;
     s.point = foot;
     s.best[0] = REAL(0.0);
     s.best[1] = REAL(0.0);
-    s.distance2 = REAL(-1.0);
+    s.found = 0;
     E[0] = -leg->A[0];
     E[1] = -leg->A[1];
     /* Of a point on a motor: away from the other one; down if they are coaxial. */
@@ -841,7 +853,7 @@ int fivebar_nearest(const fivebar_leg *leg, const fivebar_real foot[2], fivebar_
                              k & 1 ? leg->to_C.outer : leg->to_C.inner);
         }
     }
-    if (s.distance2 < REAL(0.0)) {
+    if (!s.found) {
         return FIVEBAR_UNREACHABLE;
     }
     nearest[0] = s.best[0];

@@ -143,7 +143,8 @@ int fivebar_reaches(const fivebar_leg *leg, const fivebar_real foot[2], int s_A)
 
 /* The reachable point that is nearest to a point [m]; a reachable one is returned as it is. What it
  * returns fivebar_inverse reaches. FIVEBAR_NO_ANSWER with L6 > 0, whose workspace is bounded by
- * coupler curves: compute such points beforehand with `fivebar_sim.workspace`. */
+ * coupler curves: compute such points beforehand with `fivebar_sim.workspace`. FIVEBAR_OUT_OF_LIMITS
+ * beyond 10^6 m, FIVEBAR_UNREACHABLE if the leg reaches nothing at all. */
 int fivebar_nearest(const fivebar_leg *leg, const fivebar_real foot[2], fivebar_real nearest[2]);
 
 /* A third motor that turns the leg plane. Body frame: origin on the hip's axis, x forward, y left,

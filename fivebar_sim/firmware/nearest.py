@@ -8,10 +8,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from fivebar_sim.arrays import Bools
-from fivebar_sim.firmware.elementary import Real, is_finite, numbers, square_root
+from fivebar_sim.firmware.elementary import Real, is_finite, magnitude, numbers, square_root
 from fivebar_sim.firmware.kinematics import cranks, reaches
 from fivebar_sim.firmware.leg import Chain, Leg
 from fivebar_sim.firmware.status import Status, Statuses, first_of
+
+FARTHEST = 1e6
+"""Coordinates from here on have no nearest point [m]."""
 
 
 def nearest(leg: Leg, foot: ArrayLike) -> tuple[Real, Statuses]:
@@ -29,25 +32,27 @@ def nearest(leg: Leg, foot: ArrayLike) -> tuple[Real, Statuses]:
     kind = p.dtype.type
     held = reaches(leg, p) == Status.OK
     best = np.zeros_like(p + leg.A)
-    least = np.full(best.shape[:-1], kind(np.inf))
+    found = np.zeros(best.shape[:-1], dtype=bool)
+    one = np.ones((), dtype=np.int32)
     with np.errstate(all="ignore"):
         for c, usable in _candidates(leg, p):
-            d = c - p
-            d2 = d[..., 0] * d[..., 0] + d[..., 1] * d[..., 1]
-            one = np.int32(1)
-            there = cranks(leg, c, np.asarray(one), np.asarray(one))[2] == Status.OK
-            take = usable & there & (d2 < least)
+            # |p - best|^2 - |p - c|^2 as one product, which keeps its digits where p is far away.
+            gain = (c - best) * ((p - best) + (p - c))
+            nearer = gain[..., 0] + gain[..., 1] > 0.0
+            there = cranks(leg, c, one, one)[2] == Status.OK
+            take = usable & there & (nearer | ~found)
             best = np.where(take[..., None], c, best)
-            least = np.where(take, d2, least)
+            found = found | take
 
     status = first_of(
         (~is_finite(p), Status.NOT_FINITE),
         (held, Status.OK),
         (np.asarray(leg.L6 > 0.0) & np.ones_like(held), Status.NO_ANSWER),
-        (np.isinf(least), Status.UNREACHABLE),
+        (~(magnitude(p) <= FARTHEST).all(axis=-1), Status.OUT_OF_LIMITS),
+        (~found, Status.UNREACHABLE),
     )
-    found = np.where(held[..., None], p, best)
-    return np.where((status == Status.OK)[..., None], found, kind(np.nan)), status
+    answer = np.where(held[..., None], p, best)
+    return np.where((status == Status.OK)[..., None], answer, kind(np.nan)), status
 
 
 def _candidates(leg: Leg, p: Real) -> Iterator[tuple[Real, Bools]]:
