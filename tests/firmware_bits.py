@@ -67,13 +67,14 @@ def digests(first: int, count: int, block: int, kind: Kind = np.float32) -> list
 def _digest(first: int, count: int, kind: Kind) -> str:
     index = np.arange(first, first + count, dtype=np.uint32)
     with np.errstate(all="ignore"):
-        bits = _bits(index, kind)
+        bits = bits_of(index, kind)
     plain = np.sum(bits, dtype=np.uint32)
     weighted = np.sum(bits * (np.uint32(2) * index + np.uint32(1)), dtype=np.uint32)
     return f"{(int(weighted) << 32) | int(plain):016x}"
 
 
-def _bits(index: Words, kind: Kind) -> Words:
+def bits_of(index: Words, kind: Kind) -> Words:
+    """Return one number for all that is computed of each sample, (n,)."""
     odd = draw(index, 30) & np.uint32(255)
     how = draw(index, 0)
     leg, status = firmware.prepare(_fields(index, how, odd, kind), kind)
@@ -213,9 +214,7 @@ def _fields(index: Words, how: Words, odd: Words, kind: Kind) -> dict[str, Any]:
     coarse = (how & 1) != 0
     zero = kind(0.0)
     L1, L2, L3, L4, L5, L6 = (_length(index, k, coarse, kind) for k in range(1, 7))
-    bend, tilt = (
-        np.where(coarse, zero, _between(index, k, kind, -3.14, 3.14)) for k in (7, 8)
-    )
+    bend, tilt = (np.where(coarse, zero, _between(index, k, kind, -3.14, 3.14)) for k in (7, 8))
     return {
         "L1": np.where(odd == 1, kind(np.inf), L1),
         "L2": np.where(odd == 0, kind(np.nan), L2),

@@ -22,6 +22,19 @@ def folder(name: str) -> Path:
     raise FileNotFoundError(f"fivebar-sim is installed without its folder {name!r}")
 
 
+@cache
+def file(folder: str, name: str) -> Path:
+    """Return a shipped file, where the package itself may have a folder of that name.
+
+    Raises:
+        FileNotFoundError: If the installation lacks it.
+    """
+    for base in (PACKAGE, PACKAGE.parent):
+        if (base / folder / name).is_file():
+            return base / folder / name
+    raise FileNotFoundError(f"fivebar-sim is installed without its file {folder}/{name}")
+
+
 def shipped(name: str, suffix: str = ".toml") -> dict[str, Path]:
     """Return the files of a shipped folder by stem, sorted by name."""
     return {path.stem: path for path in sorted(folder(name).glob(f"*{suffix}"))}

@@ -197,7 +197,7 @@ def multiply(a: Real, b: Real) -> Real:
 
 def is_finite(x: Real) -> Bools:
     """Return where all of a vector (..., n) is finite, (...)."""
-    return np.isfinite(x).all(axis=-1)
+    return np.asarray(np.isfinite(x).all(axis=-1))
 
 
 def _horner(c: tuple[float, ...], z: Real) -> Real:

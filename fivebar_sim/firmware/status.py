@@ -5,9 +5,7 @@ from __future__ import annotations
 from enum import IntEnum
 
 import numpy as np
-from numpy.typing import NDArray
-
-from fivebar_sim.arrays import Bools
+from numpy.typing import ArrayLike, NDArray
 
 Statuses = NDArray[np.int32]
 
@@ -26,7 +24,7 @@ class Status(IntEnum):
     NO_ANSWER = 8
 
 
-def first_of(*checks: tuple[Bools, Status]) -> Statuses:
+def first_of(*checks: tuple[ArrayLike, Status]) -> Statuses:
     """Return the status of the first check that fails, in each place; OK where none does.
 
     Args:

@@ -16,6 +16,20 @@ typedef struct {
     uint32_t sum;
 } sample;
 
+#ifdef __wasm__
+/* Without a C library the compiler still calls this for initialisers. */
+void *memset(void *to, int value, __SIZE_TYPE__ count);
+void *memset(void *to, int value, __SIZE_TYPE__ count)
+{
+    unsigned char *bytes = (unsigned char *)to;
+
+    while (count-- > 0) {
+        bytes[count] = (unsigned char)value;
+    }
+    return to;
+}
+#endif
+
 /* Return the k-th random number of a sample. */
 static uint32_t draw(uint32_t index, uint32_t k)
 {

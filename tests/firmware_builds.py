@@ -1,0 +1,117 @@
+"""The firmware's C code, compiled for many processors, and run under QEMU and Node."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+import pytest
+
+from fivebar_sim.files import resources
+
+HERE = Path(__file__).parent / "firmware"
+M4F = ("-mcpu=cortex-m4", "-mthumb", "-mfpu=fpv4-sp-d16", "-mfloat-abi=hard")
+
+
+class Target(NamedTuple):
+    """A processor.
+
+    Attributes:
+        needs: Programs without which it cannot be tested.
+        build: Compiles the driver with some flags into a folder; returns the command that runs it.
+    """
+
+    needs: tuple[str, ...]
+    build: Callable[[Path, Sequence[str]], list[str]]
+
+
+def source() -> Path:
+    """Return the firmware's source."""
+    return resources.file("firmware", "fivebar_leg.c")
+
+
+def run(*command: str | Path) -> str:
+    """Return what a program prints; its errors fail the test."""
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, f"{command}: {done.stderr or done.stdout}"
+    return done.stdout
+
+
+def need(*programs: str) -> None:
+    """Skip the test unless some programs are installed."""
+    missing = [program for program in programs if shutil.which(program) is None]
+    if missing:
+        pytest.skip(f"needs {', '.join(missing)}, which .ci/packages installs")
+
+
+def compile_leg(compiler: str, to: Path, flags: Sequence[str]) -> Path:
+    """Return the object of the firmware's source, as its users compile it.
+
+    In GNU C, whose GCC fuses multiplications and additions unless the source keeps it from that.
+    """
+    out = to / "leg.o"
+    run(compiler, "-std=gnu11", "-O2", *flags, "-c", source(), "-o", out)
+    return out
+
+
+def compile_bits(compiler: str, to: Path, flags: Sequence[str]) -> Path:
+    """Return the object of the driver, which must draw the same legs everywhere."""
+    out = to / "bits.o"
+    include = f"-I{source().parent}"
+    exact = "-ffp-contract=off"
+    run(compiler, "-std=gnu11", "-O2", exact, include, *flags, "-c", HERE / "bits.c", "-o", out)
+    return out
+
+
+def _hosted(compiler: str, link: Sequence[str], runner: Sequence[str]) -> Target:
+    """Return a target with a C library."""
+
+    def build(to: Path, flags: Sequence[str]) -> list[str]:
+        parts = [compile_leg(compiler, to, flags), compile_bits(compiler, to, flags)]
+        program = to / "bits"
+        run(compiler, *link, HERE / "main.c", *parts, "-o", program)
+        return [*runner, str(program)]
+
+    return Target((compiler, *runner), build)
+
+
+def _cortex(to: Path, flags: Sequence[str]) -> list[str]:
+    """Build for the Cortex-M4F; Linux's C library for ARM stands in for a board."""
+    flags = [*flags, *M4F]
+    parts = [
+        compile_leg("arm-none-eabi-gcc", to, flags),
+        compile_bits("arm-none-eabi-gcc", to, flags),
+    ]
+    for part in parts:
+        # The linker refuses to join the M and A profiles, whose calling convention is the same.
+        run("arm-none-eabi-objcopy", "--remove-section", ".ARM.attributes", part)
+    program = to / "bits"
+    link = ("-static", "-Wl,-z,noexecstack")
+    run("arm-linux-gnueabihf-gcc", *link, HERE / "main.c", *parts, "-o", program)
+    return ["qemu-arm", str(program)]
+
+
+def _wasm(to: Path, flags: Sequence[str]) -> list[str]:
+    """Build for WebAssembly."""
+    flags = [*flags, "--target=wasm32", "-fno-builtin-memset"]
+    parts = [compile_leg("clang", to, flags), compile_bits("clang", to, flags)]
+    module = to / "bits.wasm"
+    run("wasm-ld", "--no-entry", "--export=digest", *parts, "-o", module)
+    return ["node", str(HERE / "bits.mjs"), str(module)]
+
+
+TARGETS = {
+    "host": _hosted("cc", (), ()),
+    "clang": _hosted("clang", (), ()),
+    "cortex-m4f": Target(
+        ("arm-none-eabi-gcc", "arm-linux-gnueabihf-gcc", "qemu-arm"),
+        _cortex,
+    ),
+    "aarch64": _hosted("aarch64-linux-gnu-gcc", ("-static",), ("qemu-aarch64",)),
+    "riscv64": _hosted("riscv64-linux-gnu-gcc", ("-static",), ("qemu-riscv64",)),
+    "wasm": Target(("clang", "wasm-ld", "node"), _wasm),
+}
+"""Every processor on which the bits are compared."""
