@@ -1,0 +1,1 @@
+"""The search over designs: methods, the front, and what is kept on disk while it goes on."""

@@ -1,0 +1,177 @@
+"""The directory of a search: blocks of evaluated designs while it goes on, one table at its end.
+
+DIR/task.toml          the task
+DIR/state.json         what the directory belongs to, and whether the search is finished
+DIR/blocks/K.parquet   the K-th block, written whole or not at all; gone at the end
+DIR/designs.parquet    every evaluated design        DIR/front.parquet   the front
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import fivebar_sim
+from fivebar_sim.design.evaluation.evaluate import Evaluated, columns
+from fivebar_sim.design.evaluation.measures import limits
+from fivebar_sim.design.search.front import Front
+from fivebar_sim.design.task.task import Task
+from fivebar_sim.errors import ConfigError, RunDirectoryError
+from fivebar_sim.files import input_file, whole_file
+
+STATE = "state.json"
+DESIGNS = "designs.parquet"
+FRONT = "front.parquet"
+TASK = "task.toml"
+FEASIBLE = "feasible"
+ROW = "row"
+"""Column of front.parquet: which row of designs.parquet it is."""
+
+
+class Store:
+    """What is kept of a search.
+
+    Args:
+        task: The task.
+        folder: The directory; made if it is missing.
+
+    Raises:
+        RunDirectoryError: Something else is there, or it cannot be written.
+    """
+
+    def __init__(self, task: Task, folder: Path) -> None:
+        self.task = task
+        self.folder = folder
+        self.fingerprint = fingerprint(task)
+        self.finished = False
+        self._open()
+
+    def _open(self) -> None:
+        """Find what is there, or begin."""
+        state = self.folder / STATE
+        if state.is_file():
+            known = _state(state)
+            if known.get("fingerprint") != self.fingerprint:
+                raise RunDirectoryError(
+                    f"{self.folder} holds the search of another task, or of another version of "
+                    "this one; name another directory with --out"
+                )
+            self.finished = bool(known.get("finished"))
+            return
+
+        if self.folder.exists() and (not self.folder.is_dir() or any(self.folder.iterdir())):
+            raise RunDirectoryError(f"{self.folder} is there, and is no directory of a search")
+        whole_file.check_parent(self.folder, RunDirectoryError)
+        (self.folder / "blocks").mkdir(parents=True, exist_ok=True)
+        whole_file.write(self.folder / TASK, Path(self.task.where).read_bytes())
+        self._write_state()
+
+    def _write_state(self) -> None:
+        state = {"fingerprint": self.fingerprint, "finished": self.finished}
+        whole_file.write(self.folder / STATE, json.dumps(state, indent=2) + "\n")
+
+    def path(self, number: int) -> Path:
+        """Return the file of a block."""
+        return self.folder / "blocks" / f"{number:06d}.parquet"
+
+    def read(self, number: int) -> Evaluated | None:
+        """Return a block that was kept; None if it was not, or is unreadable."""
+        import pyarrow as pa
+        import pyarrow.parquet as pq
+
+        path = self.path(number)
+        if not path.is_file():
+            return None
+        try:
+            return self._evaluated(pq.read_table(path))
+        # A disk that lost a part of it: it is evaluated again.
+        except (pa.ArrowException, OSError, KeyError):
+            return None
+
+    def write(self, number: int, block: Evaluated) -> None:
+        """Keep a block."""
+        import pyarrow.parquet as pq
+
+        with whole_file.stage(self.path(number)) as place:
+            pq.write_table(self._table(block), place)
+
+    def stored(self, count: int) -> Iterator[Evaluated]:
+        """Yield the first blocks."""
+        for number in range(count):
+            block = self.read(number)
+            if block is None:
+                raise RunDirectoryError(f"{self.path(number)} is missing or damaged")
+            yield block
+
+    def close(self, blocks: int, front: Front, *, finished: bool) -> None:
+        """Write the tables of all designs and of the front; the blocks go if it is finished."""
+        import pyarrow as pa
+        import pyarrow.parquet as pq
+
+        with whole_file.stage(self.folder / DESIGNS) as place:
+            schema = self._table(front.designs.take(slice(0, 0))).schema
+            with pq.ParquetWriter(place, schema) as writer:
+                for block in self.stored(blocks):
+                    writer.write_table(self._table(block))
+
+        table = self._table(front.designs).append_column(ROW, pa.array(front.rows, pa.int64()))
+        with whole_file.stage(self.folder / FRONT) as place:
+            pq.write_table(table, place)
+        if finished:
+            self.finished = True
+            self._write_state()
+            shutil.rmtree(self.folder / "blocks", ignore_errors=True)
+
+    def read_front(self) -> Front:
+        """Return the front of a finished search."""
+        import pyarrow.parquet as pq
+
+        table = pq.read_table(self.folder / FRONT)
+        return Front(table.column(ROW).to_numpy(), self._evaluated(table))
+
+    def _table(self, block: Evaluated) -> Any:
+        """Return a block as an Arrow table."""
+        import pyarrow as pa
+
+        names = [each.name for each in columns(self.task)]
+        numbers = np.concatenate([block.values, block.objectives, block.measures], axis=1)
+        arrays = [pa.array(np.ascontiguousarray(column)) for column in numbers.T]
+        table = pa.table([*arrays, pa.array(block.feasible)], [*names, FEASIBLE])
+        told = [each._asdict() for each in columns(self.task)]
+        return table.replace_schema_metadata({"fivebar.columns": json.dumps(told)})
+
+    def _evaluated(self, table: Any) -> Evaluated:
+        """Return what an Arrow table holds."""
+        names = [each.name for each in columns(self.task)]
+        numbers = np.stack([table.column(name).to_numpy() for name in names], axis=1)
+        d = len(self.task.names)
+        m = d + len(self.task.objectives)
+        bounds = limits(self.task, spare=self.task.search.spare)
+        broken = [each.violation(numbers[:, m + k]) for k, each in enumerate(bounds)]
+        violations = np.stack(broken, axis=1)
+        return Evaluated(numbers[:, :d], numbers[:, d:m], numbers[:, m:], violations)
+
+
+def fingerprint(task: Task) -> str:
+    """Return a digest of all that a search depends on: the task, its files and the version."""
+    digest = hashlib.sha256(json.dumps(task.table, sort_keys=True).encode())
+    digest.update(fivebar_sim.__version__.encode())
+    digest.update(repr((task.leg, task.servos)).encode())
+    for motion in task.motions:
+        for part in (motion.path, motion.force):
+            digest.update(getattr(part, "content", b""))
+    return digest.hexdigest()
+
+
+def _state(path: Path) -> dict[str, Any]:
+    try:
+        state = input_file.read_json(path)
+    except (OSError, ValueError) as error:
+        raise ConfigError(f"{path}: not a state of a search: {error}") from None
+    return state if isinstance(state, dict) else {}
