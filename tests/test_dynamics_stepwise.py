@@ -157,6 +157,14 @@ def test_rest_takes_what_holds_the_leg_and_no_friction() -> None:
     np.testing.assert_allclose(dynamics.soft_loop(LEG, q, 1e-3, KD), q, rtol=0, atol=1e-14)
 
 
+def test_rounding_of_a_leg_at_rest_turns_no_friction_round() -> None:
+    q = np.tile(kinematics.home(LEG), (5, 1))
+    # A path sets out by less than an angle's last bits, up and down.
+    q[1::2, ::2] += 4e-15
+    held = dynamics.step_torques(LEG, q, 1e-3)
+    np.testing.assert_array_equal(dynamics.step_torques(LEG, q, 1e-3, friction=1.0), held)
+
+
 # refusal
 
 

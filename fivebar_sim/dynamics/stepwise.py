@@ -23,6 +23,10 @@ from fivebar_sim.geometry import FiveBar
 from fivebar_sim.integrator import pull
 from fivebar_sim.kinematics.rates import SINGULAR
 
+STILL = 1e-12
+"""Turn of a motor in a step that counts as none [rad]: as a path sets out, the angles' rounding
+would turn the friction round and round."""
+
 
 def step_torques(
     leg: FiveBar,
@@ -36,6 +40,7 @@ def step_torques(
     """Return the motor torques that carry all links from each row of a motion to the next.
 
         tau = G^T (H(psi) alpha + c(psi, w) - Q(psi)) - J^T F + friction sign(theta_dot+)
+        (a motor that turns by less than `STILL` in a step has sign 0)
 
     with G at psi = psi[k]. MuJoCo's step is M (v+ - v) / h + bias = tau + constraint, with M, bias
     and forces at the start of the step. The four rates need not fit the closed loop, and the loop
@@ -74,11 +79,16 @@ def step_chain(
 
     return np.stack(
         [
-            t_A - f_A + friction * np.sign(steps.w_next[0]),
-            t_E - f_E + friction * np.sign(steps.w_next[3]),
+            t_A - f_A + friction * _direction(steps.w_next[0] * timestep),
+            t_E - f_E + friction * _direction(steps.w_next[3] * timestep),
         ],
         axis=-1,
     )
+
+
+def _direction(turned: Array) -> Array:
+    """Return the sign of what a motor turns by in each step; 0 where that may be rounding."""
+    return np.where(np.abs(turned) > STILL, np.sign(turned), 0.0)
 
 
 def soft_loop(
