@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import io
+import tomllib
 from typing import Any, NamedTuple
 
 import numpy as np
 import pyarrow
 import pyarrow.parquet
-from fuzz_inputs import SCALARS, Strategy, jsons, mutated
+import tomli_w
+from fuzz_inputs import SCALARS, Strategy, changed, jsons, mutated
 from hypothesis import strategies as st
 
 DAMAGE = [
@@ -16,6 +18,9 @@ DAMAGE = [
     *("link", "loop", "dangling", "device", "pipe", "values"),
 ]
 """What may have happened to a file of a run directory."""
+
+SEALED = ("bits", "cut", "swapped", "values")
+"""What leaves files whose checksums can be written."""
 
 FILES = ["scenario.toml", "metrics.json", "rollout.parquet", "recording.rrd"]
 
@@ -28,12 +33,15 @@ class Damage(NamedTuple):
         how: One of `DAMAGE`.
         content: What is there instead, for "bits" and "values".
         other: The other file of "swapped" and "link".
+        sealed: Whether the record then gets the checksums of what is there: they would be refused
+            before anything reads the rest.
     """
 
     file: str
     how: str
     content: bytes
     other: str
+    sealed: bool = False
 
 
 @st.composite
@@ -50,10 +58,23 @@ def damages(draw: st.DrawFn, contents: dict[str, bytes]) -> Damage:
         turned[min(where, len(content) - 1)] ^= 1 << draw(st.integers(0, 7))
         content = bytes(turned)
     if how == "values":
-        content = draw(jsons(content) if file == "metrics.json" else mutated(content))
+        content = draw(_values(file, content))
     if how == "cut":
         content = content[: draw(st.integers(0, len(content) - 1))]
-    return Damage(file, how, content, other)
+    sealed = how in SEALED and draw(st.booleans())
+    return Damage(file, how, content, other, sealed)
+
+
+def _values(file: str, content: bytes) -> Strategy:
+    """Return what may be a file's content with other values."""
+    if file == "metrics.json":
+        return jsons(content)
+    if file == "rollout.parquet":
+        return records(content)
+    if file == "recording.rrd":
+        return mutated(content)
+    tables = changed(tomllib.loads(content.decode()))
+    return st.one_of(mutated(content), tables.map(lambda table: tomli_w.dumps(table).encode()))
 
 
 NUMBERS = [value for value in SCALARS if type(value) is float]
