@@ -7,8 +7,8 @@ why, where one of them shows.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
-from typing import Any, Protocol
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
@@ -26,14 +26,20 @@ from fivebar_sim.scenario.scenes import Ground
 BAR = 0.05
 """Largest part by which a metric may differ in shorter steps."""
 
-DOUBT = 0.015
-"""The same at half the timestep, from which on a quarter is tried: there it may be above the bar.
+DOUBT = 0.3
+"""Part of what is allowed from which on half a timestep is not enough, and a quarter is tried.
 
-An error of first order is half as much again at a quarter, one of order 1/2 seven tenths.
+There an error of first order is half as much again, one of order 1/2 seven tenths more.
 """
+
+CHECKED = 0.6
+"""The same of what a table [converge] allows: `fivebar converge` has looked at that metric."""
 
 NEAR = 1e-3
 """Part of the leg's size by which tracking may differ: fed forward, it is all the step's error."""
+
+FAINTEST = 1e-12
+"""No difference counts below this, of whatever unit: it is rounding."""
 
 LONGEST = 20_000
 """Steps of a run that are taken again; of a longer one, those that it begins with."""
@@ -119,30 +125,49 @@ def warnings(result: Run, again: Callable[[Scenario], Run]) -> list[str]:
         if fails:
             return [f"the timestep is too long: {when} the run fails: {'; '.join(fails)}"]
 
-        parts_off = differences(scenario, first.metrics, finer.metrics)
-        off = {key: by for key, by in parts_off.items() if by > BAR}
+        found = differences(scenario, first.metrics, finer.metrics)
+        off = [each for each in found if each.used > 1.0]
         if off:
-            named = ", ".join(_named(off, first, finer))
+            named = ", ".join(_named(off))
             why = "".join(f"; {each}" for each in _reasons(first))
             return [f"numbers depend on the timestep: {when} {named}{why}"]
-        if not any(by > DOUBT for by in parts_off.values()):
+        if not any(each.doubtful for each in found):
             return []
     return []
 
 
+class Difference(NamedTuple):
+    """A metric in shorter steps.
+
+    Attributes:
+        key: Its dotted key.
+        was: Its value before.
+        now: In shorter steps.
+        used: The difference, as a part of what is allowed.
+        doubtful: Whether it may be more than that in yet shorter steps.
+    """
+
+    key: str
+    was: float
+    now: float
+    used: float
+    doubtful: bool
+
+
 def differences(
     scenario: Scenario, was: Mapping[str, Any], now: Mapping[str, Any]
-) -> dict[str, float]:
-    """Return by how much metrics differ, as a part of the second run's, where it counts.
+) -> list[Difference]:
+    """Return how metrics differ.
 
-    It does not where the scenario's table [converge] allows it, or where next to nothing differs.
+    Allowed is a part of the second run's, `BAR` or what the scenario's table [converge] says, or
+    next to nothing.
 
     Args:
         scenario: The scenario that was run.
         was: The metrics of a run.
         now: Those of one in shorter steps.
     """
-    found = {}
+    found = []
     for key in dict.fromkeys((*WATCHED, *scenario.limits)):
         before = look_up(was, key)
         after = look_up(now, key)
@@ -151,23 +176,24 @@ def differences(
         change = abs(before - after)
         size = abs(after)
         near = NEAR * scenario.leg.size if key.startswith("tracking.") else ABSOLUTE.get(key, 0.0)
-        if change > max(near, scenario.converge.get(key, 0.0) * size):
-            found[key] = change / size if size > 0.0 else np.inf
+        least = max(near, BAR * size, FAINTEST)
+        own = scenario.converge.get(key, 0.0) * size
+        doubtful = change > max(DOUBT * least, CHECKED * own)
+        found.append(Difference(key, before, after, change / max(least, own), doubtful))
     return found
 
 
-def _named(off: Mapping[str, float], first: Run, finer: Run) -> Iterator[str]:
+def _named(off: Sequence[Difference]) -> Iterator[str]:
     """Yield what metrics are in shorter steps, and what they were."""
     seen = set()
-    for key, by in off.items():
-        was = look_up(first.metrics, key)
-        now = look_up(finer.metrics, key)
+    for key, was, now, *_ in off:
         # The whole run's peak is often that of the window.
         if (was, now) in seen:
             continue
         seen.add((was, now))
-        part = f"{100.0 * by:.0f}" if by > 0.1 else f"{100.0 * by:.2g}"
-        yield f"{SHOWN[key][0]} is {shown(key, now)}, not {shown(key, was)} ({part} % off)"
+        part = 100.0 * abs(was - now) / abs(now) if now else np.inf
+        by = f"{part:.0f}" if part > 10.0 else f"{part:.2g}"
+        yield f"{SHOWN[key][0]} is {shown(key, now)}, not {shown(key, was)} ({by} % off)"
 
 
 def _flipped(first: Run, finer: Run) -> Iterator[str]:
