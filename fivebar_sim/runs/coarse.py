@@ -26,10 +26,11 @@ from fivebar_sim.scenario.scenes import Ground
 BAR = 0.05
 """Largest part by which a metric may differ in shorter steps."""
 
-DOUBT = 0.3
+DOUBT = 0.2
 """Part of what is allowed from which on half a timestep is not enough, and a quarter is tried.
 
-There an error of first order is half as much again, one of order 1/2 seven tenths more.
+There an error of first order is half as much again, and an impact's peak may be anything: on a
+belt one differed by 1.04 % at half the timestep, and by 6.4 % at a quarter.
 """
 
 CHECKED = 0.6
