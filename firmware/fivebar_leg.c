@@ -46,6 +46,7 @@ typedef uint32_t digits;
 #define PI_REST 1.2246467991473532e-16
 #define TAN_EIGHTH 0.41421356237309503
 #define MANTISSA 53
+#define WORD 64
 #else
 #define QUARTER_1 1.57079315f
 #define QUARTER_2 3.17493686e-06f
@@ -56,6 +57,7 @@ typedef uint32_t digits;
 #define PI_REST -8.74227766e-08f
 #define TAN_EIGHTH 0.414213568f
 #define MANTISSA 24
+#define WORD 32
 #endif
 
 /* Of scripts/firmware_polynomials.py, ascending powers of x^2:
@@ -162,15 +164,15 @@ static fivebar_real square_root(fivebar_real x)
         scale *= REAL(2.0);
     }
     mantissa = (digits)(x * (fivebar_real)((digits)1 << (MANTISSA - 1)));
+    mantissa <<= WORD - 1 - MANTISSA;
 
     /* One digit more than the result has; the remainder cannot be zero where that digit is 1. */
-    for (k = MANTISSA; k >= 0; k--) {
-        digits pair = 2 * k >= MANTISSA + 1 ? mantissa >> (2 * k - MANTISSA - 1)
-                                            : mantissa << (MANTISSA + 1 - 2 * k);
-        digits next = 2 * root * 2 + 1;
+    for (k = 0; k <= MANTISSA; k++) {
+        digits next = (root << 2) | 1;
 
-        rest = (rest << 2) | (pair & 3);
-        root = root << 1;
+        rest = (rest << 2) | (mantissa >> (WORD - 2));
+        mantissa <<= 2;
+        root <<= 1;
         if (rest >= next) {
             rest -= next;
             root |= 1;
@@ -1072,26 +1074,26 @@ int fivebar_gait_at(const fivebar_gait *gait, fivebar_real phase, fivebar_real t
 
 const fivebar_leg FIVEBAR_LEG = {
 #ifdef FIVEBAR_DOUBLE
-    0.040000000000000001, 0.059999999999999998, 0.059999999999999998, 0.040000000000000001, 0.029999999999999999, 0.0, /* L1..L6 [m] */
+    0.04, 0.06, 0.06, 0.04, 0.03, 0.0, /* L1..L6 [m] */
     0.0, 0.0, /* bend, tilt [rad] */
     -1, 1, -1, /* s_A, s_E, assembly */
-    {-0.014999999999999999, -0.0}, /* A */
+    {-0.015, -0.0}, /* A */
     {1.0, 0.0}, /* foot */
     {1.0, 0.0}, /* back */
-    {0.019999999999999997, 0.10000000000000001, 0.00039999999999999986, 0.010000000000000002, 0.0003999999999999953, 0.010000000000000023, -0.0019999999999999996}, /* to_foot */
-    {0.019999999999999997, 0.10000000000000001, 0.00039999999999999986, 0.010000000000000002, 0.0003999999999999953, 0.010000000000000023, -0.0019999999999999996}, /* to_C */
+    {0.019999999999999997, 0.1, 0.00039999999999999986, 0.010000000000000002, 0.0003999999999999953, 0.010000000000000023, -0.0019999999999999996}, /* to_foot */
+    {0.019999999999999997, 0.1, 0.00039999999999999986, 0.010000000000000002, 0.0003999999999999953, 0.010000000000000023, -0.0019999999999999996}, /* to_C */
     {0.0, 0.12, 0.0, 0.0144, 0.0, 0.014400000000000026, 0.0}, /* knee_knee */
-    2.1330798877176162e-31 /* apart2 */
+    2.133079887717616e-31 /* apart2 */
 #else
-    0.0399999991f, 0.0599999987f, 0.0599999987f, 0.0399999991f, 0.0299999993f, 0.0f, /* L1..L6 [m] */
+    0.04f, 0.06f, 0.06f, 0.04f, 0.03f, 0.0f, /* L1..L6 [m] */
     0.0f, 0.0f, /* bend, tilt [rad] */
     -1, 1, -1, /* s_A, s_E, assembly */
-    {-0.0149999997f, -0.0f}, /* A */
+    {-0.015f, -0.0f}, /* A */
     {1.0f, 0.0f}, /* foot */
     {1.0f, 0.0f}, /* back */
-    {0.0199999996f, 0.099999994f, 0.00039999999f, 0.00999999885f, 0.000399997516f, 0.010000011f, -0.00199999986f}, /* to_foot */
-    {0.0199999996f, 0.099999994f, 0.00039999999f, 0.00999999885f, 0.000399997516f, 0.010000011f, -0.00199999986f}, /* to_C */
-    {0.0f, 0.119999997f, 0.0f, 0.0143999998f, 0.0f, 0.0144000137f, 0.0f}, /* knee_knee */
-    6.1481839e-14f /* apart2 */
+    {0.02f, 0.099999994f, 0.0004f, 0.009999999f, 0.00039999752f, 0.010000011f, -0.0019999999f}, /* to_foot */
+    {0.02f, 0.099999994f, 0.0004f, 0.009999999f, 0.00039999752f, 0.010000011f, -0.0019999999f}, /* to_C */
+    {0.0f, 0.12f, 0.0f, 0.0144f, 0.0f, 0.014400014f, 0.0f}, /* knee_knee */
+    6.148184e-14f /* apart2 */
 #endif
 };

@@ -33,6 +33,7 @@ FILES = sorted(
 )
 PURE = (
     "dynamics",
+    "firmware",
     "geometry",
     "kinematics",
     "workspace",

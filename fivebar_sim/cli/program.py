@@ -30,6 +30,7 @@ COMMANDS = {
     "view": "Open MuJoCo's viewer: a scenario's run, or a leg moved by sliders.",
     "workspace": "Draw what a leg's foot can reach, and how deep inside it is.",
     "certify": "Check any program that computes a leg against known answers.",
+    "export": "Write a leg for other programs: as a C library for a microcontroller.",
 }
 """The commands, each with the first line of its help.
 

@@ -39,14 +39,9 @@ def definition(leg: FiveBar) -> str:
 
 def number(value: Any) -> str:
     """Return a number as a C constant of its own type that reads back as the same bits."""
-    if np.asarray(value).dtype == np.float32:
-        return f"{_with_point(f'{float(value):.9g}')}f"
-    return _with_point(f"{float(value):.17g}")
-
-
-def _with_point(digits: str) -> str:
-    """Return digits that C takes for a floating constant."""
-    return digits if "." in digits or "e" in digits else f"{digits}.0"
+    # The shortest digits that tell it from its neighbours; whole numbers have a point, too.
+    digits = str(np.asarray(value)[()])
+    return f"{digits}f" if np.asarray(value).dtype == np.float32 else digits
 
 
 def _fields(leg: Leg) -> str:
