@@ -28,7 +28,7 @@ LEVELS = (
     "walking",
     "recording tasks",
     "runs environment gym",
-    "rollout report vector",
+    "page rollout report vector",
     "regression sweep",
     "design",
     "cli pytest_plugin",
