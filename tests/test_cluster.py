@@ -221,7 +221,7 @@ def test_cluster_that_loses_a_node_gives_the_same_bytes(
         stack.enter_context(
             node(tmp_path, *head, "--include-dashboard=false", f"--temp-dir=/tmp/ray-{port}")
         )
-        wait_for(lambda: answers(address))
+        wait_for(lambda: answers(address) and nodes(address) == 1)
         stack.enter_context(node(tmp_path, f"--address={address}", f"--node-ip-address={NODE}"))
         wait_for(lambda: nodes(address) == 2)
         run = subprocess.Popen([*command, "there", *vary, "--ray", address], stdout=subprocess.PIPE)
