@@ -9,6 +9,7 @@ import signal
 import socket
 import subprocess
 import sys
+import tempfile
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -209,6 +210,8 @@ def test_cluster_that_loses_a_node_gives_the_same_bytes(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("RAY_USAGE_STATS_ENABLED", "0")
+    # A node that takes longer to start, as on a busy machine, gives up.
+    monkeypatch.setenv("RAY_raylet_start_wait_time_s", "300")
     (tmp_path / "short.toml").write_text(JUDGED, encoding="utf-8")
     with socket.create_server((HEAD, 0)) as listening:
         address = f"{HEAD}:{listening.getsockname()[1]}"
@@ -218,9 +221,10 @@ def test_cluster_that_loses_a_node_gives_the_same_bytes(
     with ExitStack() as stack:
         port = address.rpartition(":")[2]
         head = ("--head", f"--node-ip-address={HEAD}", f"--port={port}")
-        stack.enter_context(
-            node(tmp_path, *head, "--include-dashboard=false", f"--temp-dir=/tmp/ray-{port}")
-        )
+        # Its sockets are in there, and their names may have 107 bytes.
+        short = stack.enter_context(tempfile.TemporaryDirectory(prefix="ray"))
+        more = ("--include-dashboard=false", f"--temp-dir={short}")
+        stack.enter_context(node(tmp_path, *head, *more))
         wait_for(lambda: answers(address) and nodes(address) == 1)
         stack.enter_context(node(tmp_path, f"--address={address}", f"--node-ip-address={NODE}"))
         wait_for(lambda: nodes(address) == 2)
