@@ -9,6 +9,7 @@ import msgspec
 
 from fivebar_sim.metrics.guards import Guard
 from fivebar_sim.metrics.measured import Judged, JudgedRows, Verdict
+from fivebar_sim.robots.measured import RobotJudged
 
 PROVENANCE = {
     "mujoco": "3.17.0",
@@ -29,7 +30,8 @@ def judged(
     """Return all of metrics.json.
 
     Args:
-        values: Metrics by dotted key; a table "ground" is there if one of them is in it.
+        values: Metrics by dotted key; a table "ground" is there if one of them is in it;
+            with one of the table "robot" all others are those of a robot.
         guards: The guards of the run.
         verdict: The run's verdict.
         provenance: What the numbers depend on.
@@ -46,7 +48,8 @@ def judged(
         for part in parents:
             table = table.setdefault(part, {})
         table[last] = value
-    return _filled(JudgedRows, tables)
+    kind = RobotJudged if "robot" in tables else JudgedRows
+    return _filled(kind, tables)
 
 
 def _filled(kind: type[Any], values: Mapping[str, Any]) -> Any:

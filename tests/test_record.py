@@ -16,7 +16,7 @@ from fivebar_sim import kinematics, metrics, rollout
 from fivebar_sim.arrays import Array
 from fivebar_sim.errors import ConfigError
 from fivebar_sim.metrics import load
-from fivebar_sim.metrics.catalogue import SHOWN, shown
+from fivebar_sim.metrics.catalogue import ROBOTS, SHOWN, shown
 from fivebar_sim.rollout import Plan, Result
 from fivebar_sim.scenario import Scenario
 from fivebar_sim.simulation import record
@@ -186,7 +186,7 @@ def test_every_limit_resolves_and_is_shown() -> None:
         value = metrics.look_up(measured, key)
         assert isinstance(value, (int, float)), key
         assert shown(key, value)
-    assert set(SHOWN) == set(metrics.LIMIT_KEYS)
+    assert set(SHOWN) == {*metrics.LIMIT_KEYS, *(metric.key for metric in ROBOTS)}
     limits: dict[str, tuple[float, float]] = {key: (-1e9, 1e9) for key in metrics.LIMIT_KEYS}
     judged = metrics.judge(measured, limits)
     assert [limit.key for limit in judged] == list(metrics.LIMIT_KEYS)

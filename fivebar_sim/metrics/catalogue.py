@@ -25,6 +25,9 @@ WINDOW = "measured window"
 RUN = "whole run"
 """Every step, also those before the measured window."""
 
+DEGREES = math.degrees(1.0)
+"""Of a radian."""
+
 
 class Metric(NamedTuple):
     """One metric.
@@ -280,10 +283,32 @@ CATALOGUE = (
     Metric("branch.flips", "branch flips", 1.0, "", window=RUN),
     Metric("warnings", "MuJoCo warnings", 1.0, "", window=RUN),
 )
-"""Every metric that a scenario may set a limit on, in the order in which they are shown."""
+"""Every metric of a leg that a scenario may set a limit on, in the order in which they are shown.
+
+A robot has them too, of its four legs together.
+"""
+
+ROBOTS = (
+    Metric("robot.speed", "robot's speed", 1.0, "m/s", tolerance=1e-4),
+    Metric("robot.body_lengths_per_second", "body lengths a second", 1.0, "1/s", tolerance=1e-3),
+    Metric("robot.drift", "speed to the left", 1.0, "m/s", tolerance=1e-3),
+    Metric("robot.turn_rate", "turning to the left", 1.0, "rad/s", tolerance=1e-2),
+    Metric("robot.lean", "trunk leans up to", DEGREES, "deg", tolerance=1e-3, less_is_better=True),
+    Metric("robot.bob", "trunk bobs by", 1e3, "mm", tolerance=1e-5, less_is_better=True),
+    Metric("robot.falls", "falls", 1.0, "", tolerance=0.5, less_is_better=True, window=RUN),
+    Metric("robot.cost_of_transport", "cost of transport", 1.0, ""),
+    Metric("robot.cost_of_transport_electric", "the same with heat", 1.0, ""),
+)
+"""The metrics that only a robot has."""
+
+EVERY = (*ROBOTS, *CATALOGUE)
+"""Every metric there is, in the order in which they are shown."""
 
 LIMIT_KEYS = tuple(metric.key for metric in CATALOGUE)
-"""The metrics that a scenario may set limits on."""
+"""The metrics that a leg's scenario may set limits on."""
+
+ROBOT_KEYS = tuple(metric.key for metric in EVERY if not metric.key.startswith("ground.rail"))
+"""The metrics that a robot's scenario may set limits on: no rail ends under its trunk."""
 
 GROUND_KEYS = tuple(
     key for key in LIMIT_KEYS if key.startswith(("ground.", "ground_peak.", "whole.ground_peak."))
@@ -302,7 +327,7 @@ COOLING_KEYS = (
 LINE_KEYS = ("load.line.A", "load.line.E")
 """The metrics of servos with a torque-speed line."""
 
-BY_KEY = {metric.key: metric for metric in CATALOGUE}
+BY_KEY = {metric.key: metric for metric in EVERY}
 """Every metric by its key."""
 
 SHOWN = {
@@ -311,23 +336,23 @@ SHOWN = {
         metric.scale,
         metric.unit,
     )
-    for metric in CATALOGUE
+    for metric in EVERY
 }
 """Label, factor from SI to the shown unit, and shown unit of each metric, by key.
 
 A label that ends with "(run)" is of the whole run, any other of the measured window.
 """
 
-LISTED = tuple(metric.key for metric in CATALOGUE if not metric.same_as)
+LISTED = tuple(metric.key for metric in EVERY if not metric.same_as)
 """The metrics that a table of all of them lists: those that repeat no other."""
 
-BESIDE = {metric.whole: metric.key for metric in CATALOGUE if metric.whole}
+BESIDE = {metric.whole: metric.key for metric in EVERY if metric.whole}
 """Metrics of the whole run that tables show beside one of the window: their keys, and its key."""
 
-ABSOLUTE = {metric.key: metric.tolerance for metric in CATALOGUE if metric.tolerance is not None}
+ABSOLUTE = {metric.key: metric.tolerance for metric in EVERY if metric.tolerance is not None}
 """Absolute tolerance of the metrics of a baseline, in SI units, by key."""
 
-LESS_IS_BETTER = tuple(metric.key for metric in CATALOGUE if metric.less_is_better)
+LESS_IS_BETTER = tuple(metric.key for metric in EVERY if metric.less_is_better)
 """Metrics of a baseline that fail only when they grow."""
 
 MEASURED = tuple(metric for metric in CATALOGUE if metric.function is not None)

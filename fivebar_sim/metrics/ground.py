@@ -123,7 +123,7 @@ def measure(leg: FiveBar, record: Mapping[str, Array], window: slice) -> GroundM
         stance_share=float(down[window].mean()),
         slip=float(slip.sum()),
         foot_height_max=float(height(leg, record).max()),
-        flight_max=h * _longest(~down),
+        flight_max=h * longest(~down),
     )
 
 
@@ -144,7 +144,7 @@ def rail_end_max(leg: FiveBar, record: Mapping[str, Array], window: slice) -> fl
     return float(record["rail_end"].max())
 
 
-def _longest(chosen: Bools) -> int:
+def longest(chosen: Bools) -> int:
     """Return the length of the longest run of True."""
     # Runs begin and end where False turns into True and back.
     edges = np.flatnonzero(np.diff(np.concatenate([[False], chosen, [False]])))

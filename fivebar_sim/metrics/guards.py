@@ -114,13 +114,15 @@ class Guard(Table, frozen=True):
     def bound(self) -> str:
         """What must not happen, in words, of the part that tripped it or of any part of the leg."""
         rule = RULES[self.name]
-        return rule.what.format(rule.show(self.high, 3), part=self.part or "leg")
+        return rule.what.format(rule.show(self.high, 3), part=self.part or rule.who)
 
     def __str__(self) -> str:
         """Return the message of a guard that tripped: the bound, when, and the worst value."""
         rule = RULES[self.name]
         worst = rule.worst.format(rule.show(self.value, 3))
-        return f"guard {self.name}: {self.bound} at t = {self.time:g} s{worst}"
+        # A leg of a robot, where the sentence has no place for it.
+        of = f" of {self.part}" if self.part and "{part}" not in rule.what else ""
+        return f"guard {self.name}{of}: {self.bound} at t = {self.time:g} s{worst}"
 
 
 class Evidence(NamedTuple):
@@ -184,6 +186,7 @@ class Rule(NamedTuple):
         worst: Last part of its message, with {} for the worst value and its unit.
         scale: Factor from SI to the shown unit.
         unit: The shown unit.
+        who: What {part} is while the guard holds.
     """
 
     name: str
@@ -192,6 +195,7 @@ class Rule(NamedTuple):
     worst: str
     scale: float
     unit: str
+    who: str = "leg"
 
     def show(self, value: float | None, digits: int = 4) -> str:
         """Return a bound or a value as people read it: "1.2 mm"."""
@@ -252,7 +256,7 @@ def _leaned(run: Evidence) -> Found:
     # Nobody planned the force of a stop: the motion is not the one that was asked for.
     q = side_by_side(run.record, JOINT_COLUMNS)
     found = beyond(q, run.ranges)
-    return _first_of(run, {f"joint {joint}": found[joint] for joint in found}, run.bounds.stops)
+    return first_of(run, {f"joint {joint}": found[joint] for joint in found}, run.bounds.stops)
 
 
 def _overheated(run: Evidence) -> Found | None:
@@ -284,7 +288,7 @@ def _through_floor(run: Evidence) -> Found | None:
         return None
     # Only the foot collides: anything else would go through the floor without a force.
     found = ground.depths(run.leg, run.record, run.trunk)
-    return _first_of(run, found, run.bounds.floor * run.leg.size)
+    return first_of(run, found, run.bounds.floor * run.leg.size)
 
 
 def _carrying_rail(run: Evidence) -> Found | None:
@@ -292,6 +296,11 @@ def _carrying_rail(run: Evidence) -> Found | None:
         return None
     # What the end carries, foot and motors do not: their load would be that of a lighter robot.
     return _highest(run, run.record["rail_end"], run.bounds.rail)
+
+
+def _fallen(run: Evidence) -> Found | None:
+    # A leg alone hangs on its rail; of a robot, `walking.guards` looks at the trunk.
+    del run
 
 
 def _creeping(run: Evidence) -> Found | None:
@@ -308,7 +317,7 @@ def _highest(run: Evidence, values: Array, high: float) -> Found:
     return Found(float(values.max()), high, _first(values > high, run.record["time"]))
 
 
-def _first_of(run: Evidence, parts: Mapping[str, Array], high: float) -> Found:
+def first_of(run: Evidence, parts: Mapping[str, Array], high: float) -> Found:
     """Return the worst value of all parts, and which of them was the first above the bound."""
     found = {part: _highest(run, values, high) for part, values in parts.items()}
     worst = max((each.value or 0.0 for each in found.values()), default=0.0)
@@ -454,6 +463,15 @@ GUARDS = (
         ", {} at worst",
         1.0,
         "N",
+    ),
+    Rule(
+        "fall",
+        _fallen,
+        "the robot fell: {part}",
+        ", {} in all",
+        1.0,
+        "falls",
+        "its trunk came down",
     ),
 )
 """Every guard, in the order of metrics.json; a new guard is a rule and a function."""

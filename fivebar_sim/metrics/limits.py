@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 from fivebar_sim.errors import unknown
-from fivebar_sim.metrics.catalogue import LIMIT_KEYS, shown
+from fivebar_sim.metrics.catalogue import BY_KEY, shown
 from fivebar_sim.metrics.json_types import Number, Table
 
 
@@ -31,8 +31,8 @@ class WrittenLimit(Table, frozen=True):
     ok: bool
 
     def __post_init__(self) -> None:
-        if self.key not in LIMIT_KEYS:
-            raise ValueError(unknown("metric", self.key, LIMIT_KEYS))
+        if self.key not in BY_KEY:
+            raise ValueError(unknown("metric", self.key, BY_KEY))
 
     @classmethod
     def of(cls, limit: Limit) -> WrittenLimit:

@@ -103,9 +103,18 @@ def of(
 def with_verdict(
     measured: Measured, limits: Sequence[Limit], provenance: Mapping[str, str | int | float | None]
 ) -> Judged:
-    """Return what was measured with its verdict.
+    """Return what was measured with its verdict; see `judgement`."""
+    judged = judgement(measured, limits, provenance)
+    return JudgedRows(**{**msgspec.structs.asdict(measured), **judged})
 
-    It is "fail" if a limit or a guard does not hold; else "pass", or "not judged" without limits.
+
+def judgement(
+    measured: Measured, limits: Sequence[Limit], provenance: Mapping[str, str | int | float | None]
+) -> dict[str, Any]:
+    """Return what `Judged` has besides what was measured.
+
+    The verdict is "fail" if a limit or a guard does not hold; else "pass", or "not judged" without
+    limits.
 
     Args:
         measured: What was measured.
@@ -115,12 +124,11 @@ def with_verdict(
     good = all(limit.ok for limit in limits) and all(guard.ok for guard in measured.guards)
     # Guards only say that the physics can be trusted, not that the leg did what it should.
     passed = "pass" if limits else NOT_JUDGED
-    judged = {
+    return {
         "verdict": passed if good else "fail",
         "limits": [WrittenLimit.of(limit) for limit in limits],
         "provenance": dict(provenance),
     }
-    return JudgedRows(**{**msgspec.structs.asdict(measured), **judged})
 
 
 def read(table: Any) -> Judged:

@@ -14,7 +14,7 @@ from fivebar_sim.control import Feedback, Setpoints
 from fivebar_sim.errors import ArgumentError, ConfigError, FiveBarError, unknown
 from fivebar_sim.files import tables
 from fivebar_sim.metrics import guards
-from fivebar_sim.metrics.catalogue import LIMIT_KEYS, SHOWN, shown
+from fivebar_sim.metrics.catalogue import SHOWN, shown
 from fivebar_sim.metrics.columns import Record
 from fivebar_sim.metrics.limits import Limit, bounds, has, judge
 from fivebar_sim.metrics.measured import Verdict
@@ -92,7 +92,7 @@ class LegRun:
         """
         __tracebackhide__ = True
         # A scene without a ground has no metrics of one.
-        known = [each for each in LIMIT_KEYS if has(self.metrics, each)]
+        known = [each for each in SHOWN if has(self.metrics, each)]
         if key not in known:
             raise ArgumentError(unknown("metric", key, known))
         if low is None and high is None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any, NamedTuple
 
-from fivebar_sim.metrics.catalogue import BESIDE, BY_KEY, CATALOGUE, RUN, Metric, shown
+from fivebar_sim.metrics.catalogue import BESIDE, BY_KEY, EVERY, RUN, Metric, shown
 from fivebar_sim.metrics.limits import Limit, bounds, has, look_up
 
 
@@ -34,7 +34,7 @@ def side_by_side(metrics: Mapping[str, Any], limits: Mapping[str, Limit]) -> Ite
         metrics: All of metrics.json.
         limits: The judged limits by key.
     """
-    for metric in CATALOGUE:
+    for metric in EVERY:
         limit = limits.get(metric.key)
         if not has(metrics, metric.key) or not (limit or _matters(metric, metrics)):
             continue
