@@ -1,4 +1,7 @@
-"""The shipped scenarios, and what comes of them, simulated once for all tests of a process."""
+"""The shipped scenarios of legs, and what comes of them, simulated once for all tests of a process.
+
+Those of robots, whose names begin with "robot-", have tests of their own.
+"""
 
 from __future__ import annotations
 
@@ -14,7 +17,7 @@ from fivebar_sim.rollout import Plan, Result
 from fivebar_sim.runs import directory
 from fivebar_sim.scenario import Scenario
 
-NAMES = sorted(resources.shipped("scenarios"))
+NAMES = sorted(name for name in resources.shipped("scenarios") if not name.startswith("robot-"))
 SCENARIOS = {name: Scenario.load(name) for name in NAMES}
 
 

@@ -80,7 +80,7 @@ def test_refusal(keys: dict, message: str) -> None:
         Gait(**{"path": STEP, "phases": TROT, **keys})
 
 
-def test_path_must_repeat() -> None:
+def test_path_with_phases_must_repeat() -> None:
     once = Step(start=(0.0, -0.045), stop=(0.01, -0.045), lift=0.005, seconds=0.5)
-    with pytest.raises(ArgumentError, match="path must repeat"):
+    with pytest.raises(ArgumentError, match=r"phases must all be 0: the path"):
         Gait(path=once, phases=TROT)

@@ -19,7 +19,7 @@ ALL = slice(None)
 
 def trunk(position: Array, turned: Rotation) -> Trunk:
     time: Array = 1e-3 * np.arange(1, len(position) + 1, dtype=np.float64)
-    return Trunk(time, position, turned.as_quat(scalar_first=True))
+    return Trunk(time, position, turned.as_quat(scalar_first=True), np.zeros_like(position))
 
 
 def about(axis: str, angle: Array) -> Rotation:

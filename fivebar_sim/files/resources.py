@@ -36,5 +36,7 @@ def file(folder: str, name: str) -> Path:
 
 
 def shipped(name: str, suffix: str = ".toml") -> dict[str, Path]:
-    """Return the files of a shipped folder by stem, sorted by name."""
-    return {path.stem: path for path in sorted(folder(name).glob(f"*{suffix}"))}
+    """Return the files of a shipped folder and of the folders in it by stem, sorted by name."""
+    # Robots' scenarios have a folder of their own.
+    files = [*folder(name).glob(f"*{suffix}"), *folder(name).glob(f"*/*{suffix}")]
+    return {path.stem: path for path in sorted(files, key=lambda path: path.name)}

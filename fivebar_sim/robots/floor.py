@@ -25,3 +25,5 @@ class Floor(scenes.Scene, frozen=True, tag="floor"):
 
 Scene = Air | Floor
 """What a robot may stand on; `Rail` and the others are for a leg alone."""
+
+KINDS: dict[str, type[Scene]] = {str(kind.__struct_config__.tag): kind for kind in (Air, Floor)}

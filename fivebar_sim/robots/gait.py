@@ -14,12 +14,27 @@ from fivebar_sim.robots.robot import LEGS, Robot
 TROT = {"FL": 0.0, "FR": 0.5, "RL": 0.5, "RR": 0.0}
 """Phases of a trot: the legs of a diagonal together, the two diagonals half a period apart."""
 
+TOGETHER = dict.fromkeys(LEGS, 0.0)
+"""Phases of legs that all do the same at the same time."""
+
+PHASES = {
+    "together": TOGETHER,
+    "trot": TROT,
+    "bound": {"FL": 0.0, "FR": 0.0, "RL": 0.5, "RR": 0.5},
+    "pace": {"FL": 0.0, "FR": 0.5, "RL": 0.0, "RR": 0.5},
+}
+"""Gaits that have a name, by their phases."""
+
 SAMPLES = 1000
 """Points of a period among which the middle of a stride is looked for."""
 
 
+LONGEST = 1e3
+"""Of a path that goes on for ever without repeating, so much is looked at [s]."""
+
+
 class Gait(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """A foot path that repeats, for each leg at its own phase.
+    """A foot path for each leg, at its own phase if it repeats.
 
     Strides differ to turn: with those of one side negative the robot turns on the spot.
 
@@ -35,14 +50,14 @@ class Gait(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
     strides: dict[str, float] | None = None
 
     def __post_init__(self) -> None:
-        if self.path.period is None:
-            raise ArgumentError("path must repeat: a gait has phases")
         _check_legs("phases", self.phases)
         _check_legs("strides", self.strides or dict.fromkeys(LEGS, 1.0))
+        if self.path.period is None and any(self.phases.values()):
+            raise ArgumentError("phases must all be 0: the path does not repeat")
 
     @property
     def period(self) -> float:
-        """Time after which every foot repeats [s]."""
+        """Time after which every foot repeats [s]; 0 where none does."""
         return float(self.path.period or 0.0)
 
     def paths(self, robot: Robot) -> dict[str, FootPath]:
@@ -51,7 +66,8 @@ class Gait(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
         Each starts from rest within the ramp of the gait's path, where the leg's phase begins.
         """
         # Past the ramp the path is what it is for good, at its own time.
-        time = np.linspace(0.0, self.period, SAMPLES)
+        seconds = self.period or min(self.path.moves, self.path.span, LONGEST)
+        time = np.linspace(0.0, seconds, SAMPLES)
         x = self.path.nominal(time).position[:, 0]
         middle = 0.5 * float(x.min() + x.max())
 
@@ -91,8 +107,18 @@ class Ahead(FootPath, frozen=True, tag="ahead"):
 
     @property
     def period(self) -> float | None:
-        """Time after which the path repeats [s]."""
+        """Time after which the path repeats [s]; None where it does not."""
         return self.path.period
+
+    @property
+    def span(self) -> float:
+        """How long the path is defined [s]."""
+        return self.path.span
+
+    @property
+    def moves(self) -> float:
+        """How long the foot moves [s]."""
+        return self.path.moves
 
     def nominal(self, time: ArrayLike) -> Sample:
         """Return the other path at a later time, its x scaled; see `FootPath.nominal`."""

@@ -20,11 +20,13 @@ class Trunk(NamedTuple):
         time: [s], (N,).
         position: Of its origin, world [m], (N, 3).
         quaternion: (w, x, y, z), (N, 4).
+        turning: Its rates about its own axes [rad/s], (N, 3).
     """
 
     time: Array
     position: Array
     quaternion: Array
+    turning: Array
 
 
 class Fall(NamedTuple):

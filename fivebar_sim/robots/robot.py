@@ -8,6 +8,7 @@ RL -- RR     parallel to x-z.
 from __future__ import annotations
 
 import math
+from dataclasses import asdict
 from itertools import combinations
 from pathlib import Path
 from typing import Any
@@ -188,6 +189,24 @@ class Robot(msgspec.Struct, frozen=True, kw_only=True):
             )
         except ArgumentError as error:
             raise ConfigError(f"{where}: {error}") from None
+
+    def table(self) -> Table:
+        """Return the robot as a TOML table, leg and servo spelt out."""
+        trunk = msgspec.to_builtins(self.trunk)
+        hips = {name: msgspec.to_builtins(hip) for name, hip in self.hips.items()}
+        return {
+            "name": self.name,
+            "leg": _present(asdict(self.leg)),
+            "servo": _present(msgspec.to_builtins(self.servo)),
+            "mass": self.mass,
+            "trunk": _present(trunk),
+            "hips": hips,
+        }
+
+
+def _present(table: Table) -> Table:
+    """Return the keys that have a value: TOML has no null."""
+    return {key: value for key, value in table.items() if value is not None}
 
 
 def _printable(name: Any, where: str) -> str:

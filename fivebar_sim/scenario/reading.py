@@ -30,7 +30,7 @@ NAME = re.compile(r"""(?![. ])[^/\\:*?"<>|]+(?<! )""")
 LONGEST_NAME = 200
 """A name may have 255 bytes on most systems, and the run directory's stage adds some."""
 
-SHORT = {"leg": "preset", "servo": "preset", "scene": "kind"}
+SHORT = {"leg": "preset", "servo": "preset", "robot": "preset", "scene": "kind"}
 """Tables that may be given as a string, and the key that the string is short for."""
 
 BY_METRIC = ("limits", "converge")
@@ -152,13 +152,13 @@ def sim(value: Any, scene: Scene, where: str) -> Sim:
     return tables.convert(value, Sim, "sim", where)
 
 
-def converge(value: Any, where: str) -> dict[str, float]:
-    """Return the table [converge]: relative errors by metric.
+def converge(value: Any, where: str, known: Iterable[str] = LIMIT_KEYS) -> dict[str, float]:
+    """Return the table [converge]: relative errors by metric, each one of the known.
 
     Raises:
         ConfigError: Not a table, an unknown key, or an error that is not a number of at least 0.
     """
-    allowed = tables.bounds(value, LIMIT_KEYS, "converge", where)
+    allowed = tables.bounds(value, known, "converge", where)
     for key, (low, high) in allowed.items():
         if low != -math.inf or not high >= 0.0:
             raise ConfigError(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import math
 from collections.abc import Iterable
 from dataclasses import asdict
@@ -26,6 +27,7 @@ from fivebar_sim.metrics.guards import Guards
 from fivebar_sim.paths import FootPath, Gait
 from fivebar_sim.scenario import forces, reading
 from fivebar_sim.scenario.forces import FootForce
+from fivebar_sim.scenario.leg_words import leg_words
 from fivebar_sim.scenario.scenes import Air, Ground, Payload, Scene, Treadmill
 
 MOST_STEPS = 5_000_000
@@ -73,6 +75,11 @@ class Scenario(msgspec.Struct, frozen=True, kw_only=True):
     guards: Guards = Guards()
     limits: dict[str, tuple[float, float]] = {}
     converge: dict[str, float] = {}
+
+    @property
+    def words(self) -> str:
+        """What is simulated: "classic leg, L2 = 70 mm"."""
+        return leg_words(self.leg, self.servo.armature)
 
     @property
     def steps(self) -> int:
@@ -144,6 +151,8 @@ class Scenario(msgspec.Struct, frozen=True, kw_only=True):
     def load(cls, source: str | Path, settings: Iterable[str] = ()) -> Scenario:
         """Return a shipped scenario by name, or the scenario of a TOML file.
 
+        That of a file with the key `robot` is a `robots.scenario.RobotScenario`.
+
         Args:
             source: "classic-ellipse", or a path.
             settings: Changes "KEY=VALUE" with dotted keys, applied in order.
@@ -158,8 +167,9 @@ class Scenario(msgspec.Struct, frozen=True, kw_only=True):
         table = tables.read(path, "scenario")
         for setting in settings:
             reading.change(table, *tables.parse_setting(setting), str(source))
+        kind = _of_robots() if cls is Scenario and "robot" in table else cls
         # A file without a name gives the run its own; a key `name` in it, or a setting, wins.
-        return cls.from_table({"name": path.stem, **table}, str(source), path.parent)
+        return kind.from_table({"name": path.stem, **table}, str(source), path.parent)
 
     @classmethod
     def from_table(cls, table: Table, where: str, folder: Path) -> Scenario:
@@ -192,7 +202,7 @@ class Scenario(msgspec.Struct, frozen=True, kw_only=True):
             converge=reading.converge(table.get("converge", {}), where),
         )
         # Last: these compare the tables with each other, each of which is legal by now.
-        _check_window(scenario, where)
+        check_window(scenario, where)
         _check_scene(scenario, where)
 
         return scenario
@@ -284,12 +294,18 @@ def copied_name(part: FootPath | FootForce | None) -> str | None:
     return name if name.endswith(".csv") else f"{name}.csv"
 
 
+def _of_robots() -> type[Scenario]:
+    """Return the class of robots' scenarios."""
+    # By name, as controllers are found: it stands above this room, whose parts robots are made of.
+    return importlib.import_module("fivebar_sim.robots.scenario").RobotScenario
+
+
 def _present(table: Table) -> Table:
     """Return the keys that have a value: TOML has no null."""
     return {key: value for key, value in table.items() if value is not None}
 
 
-def _check_window(scenario: Scenario, where: str) -> None:
+def check_window(scenario: Scenario, where: str) -> None:
     """Raise unless the run is long enough to measure, and path and force last as long as it."""
     h = scenario.sim.timestep
     path = scenario.path

@@ -222,11 +222,16 @@ def lowest(built: mujoco.MjModel) -> float:
     return min(below)
 
 
-def ranges(built: mujoco.MjModel) -> Ranges:
-    """Return the ranges of the hinges that have stops, and that of the angle at C."""
-    ids = {joint: built.joint(joint).id for joint in JOINTS}
+def ranges(built: mujoco.MjModel, front: str = "") -> Ranges:
+    """Return the ranges of the hinges that have stops, and that of the angle at C.
+
+    Args:
+        built: The model.
+        front: What the names of a robot's leg begin with, "FL_".
+    """
+    ids = {joint: built.joint(f"{front}{joint}").id for joint in JOINTS}
     limited = {joint: built.jnt_range[i] for joint, i in ids.items() if built.jnt_limited[i]}
-    tendon = built.tendon("C_angle").id
+    tendon = built.tendon(f"{front}C_angle").id
     if built.tendon_limited[tendon]:
         limited["C"] = built.tendon_range[tendon]
     return {joint: (float(low), float(high)) for joint, (low, high) in limited.items()}

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+import msgspec
 import mujoco
 import numpy as np
 
@@ -17,43 +18,53 @@ from fivebar_sim.model.robot import standing_height
 from fivebar_sim.motion import Motion
 from fivebar_sim.paths import FootPath
 from fivebar_sim.robots import LEGS, Floor, Gait, Robot, Scene
+from fivebar_sim.robots.scenario import RobotScenario
 from fivebar_sim.scenario import Scenario
-from fivebar_sim.simulation.plan import asked_setpoints, sent_setpoints
+from fivebar_sim.simulation.plan import Plan, asked_setpoints, sent_setpoints
 
 
 class RobotPlan(NamedTuple):
     """A robot whose legs follow a gait, ready to be simulated.
 
     Attributes:
-        robot: The robot.
-        gait: What its feet do.
-        scene: What it stands on.
-        sim: Timestep, integrator, seed.
-        motions: What each leg should do, in the order of `LEGS`; each foot in its hip frame.
+        scenario: The robot's scenario.
+        legs: The plan of each leg, in the order of `LEGS`, as if it were alone in the air; each has
+            the robot's model.
         model: The compiled MuJoCo model.
         start: qpos at t = 0: level, at rest, the lowest foot on the floor.
         setpoints: What reaches the motors in every step [rad], (N, 8).
     """
 
-    robot: Robot
-    gait: Gait
-    scene: Scene
-    sim: Sim
-    motions: tuple[Motion, ...]
+    scenario: RobotScenario
+    legs: tuple[Plan, ...]
     model: mujoco.MjModel
     start: Array
     setpoints: Array
 
     @property
+    def robot(self) -> Robot:
+        """The robot."""
+        return self.scenario.robot
+
+    @property
+    def motions(self) -> tuple[Motion, ...]:
+        """What each leg should do, in the order of `LEGS`; each foot in its hip frame."""
+        return tuple(leg.motion for leg in self.legs)
+
+    @property
+    def scene(self) -> Scene:
+        """What it stands on."""
+        return self.scenario.scene
+
+    @property
+    def sim(self) -> Sim:
+        """Timestep, integrator, seed."""
+        return self.scenario.sim
+
+    @property
     def window(self) -> slice:
-        """The rows that speed and load are measured over: whole periods after the ramp."""
-        h = self.sim.timestep
-        ramp = self.gait.path.ramp
-        steps = len(self.setpoints)
-        # 1e-9: a duration of whole periods must not lose one to rounding.
-        periods = int((steps * h - ramp) / self.gait.period * (1.0 + 1e-9))
-        first = round(ramp / h)
-        return slice(first, min(round((ramp + periods * self.gait.period) / h), steps))
+        """The rows that speed and load are measured over; see `Scenario.window`."""
+        return self.scenario.window
 
 
 def plan(
@@ -83,46 +94,69 @@ def plan(
             cannot be sent.
         GeometryError: Legs that cannot stand.
     """
-    scene = Floor() if scene is None else scene
-    sim = Sim() if sim is None else sim
-    law: Setpoints = control.find("servo")() if controller is None else controller
     _check_duration(gait, duration)
+    law: Setpoints = control.find("servo")() if controller is None else controller
 
-    paths = gait.paths(robot)
-    legs = [_of_leg(robot, paths[leg], law, duration, sim, leg) for leg in LEGS]
-    motions = tuple(each for each, _ in legs)
-    start = np.concatenate([each.q[0] for each in motions])
-    if isinstance(scene, Floor):
+    return plan_scenario(
+        RobotScenario(
+            name=robot.name,
+            robot=robot,
+            leg=robot.leg,
+            servo=robot.servo,
+            path=gait.path,
+            phases=gait.phases,
+            strides=gait.strides,
+            controller=law,
+            controller_name=name_of(law),
+            scene=Floor() if scene is None else scene,
+            duration=duration,
+            sim=Sim() if sim is None else sim,
+        )
+    )
+
+
+def plan_scenario(scenario: RobotScenario) -> RobotPlan:
+    """Return the plan of a robot's scenario; errors are those of `plan`."""
+    robot = msgspec.structs.replace(scenario.robot, servo=scenario.servo)
+    sim = scenario.sim
+    # First: a robot that cannot stand is refused before any of its legs is planned.
+    built = model.build_robot(
+        robot, scenario.scene, timestep=sim.timestep, integrator=sim.integrator
+    )
+    paths = scenario.gait.paths(robot)
+    legs = tuple(_of_leg(scenario, paths[leg], leg, built) for leg in LEGS)
+    start = np.concatenate([leg.start for leg in legs])
+    if isinstance(scenario.scene, Floor):
         height = standing_height(robot, start.reshape(len(LEGS), 4))
         start = np.concatenate([[0.0, 0.0, height, 1.0, 0.0, 0.0, 0.0], start])
 
-    built = model.build_robot(robot, scene, timestep=sim.timestep, integrator=sim.integrator)
-    setpoints = np.concatenate([sent for _, sent in legs], axis=1)
-    return RobotPlan(robot, gait, scene, sim, motions, built, start, setpoints)
+    sent = [leg.setpoints for leg in legs if leg.setpoints is not None]
+    return RobotPlan(scenario, legs, built, start, np.concatenate(sent, axis=1))
 
 
-def _of_leg(
-    robot: Robot, path: FootPath, controller: Setpoints, duration: float, sim: Sim, leg: str
-) -> tuple[Motion, Array]:
-    """Return what one leg should do, and the setpoints that reach its motors, (N, 2)."""
+def _of_leg(scenario: RobotScenario, path: FootPath, leg: str, built: mujoco.MjModel) -> Plan:
+    """Return the plan of one leg."""
+    controller = scenario.controller
+    assert isinstance(controller, Setpoints)
     # A leg is planned as it is alone: nothing of what a step does is written twice.
     alone = Scenario(
-        name=f"{robot.name} {leg}",
-        leg=robot.leg,
+        name=f"{scenario.name} {leg}",
+        leg=scenario.leg,
         path=path,
         controller=controller,
-        controller_name=name_of(controller),
-        servo=robot.servo,
-        duration=duration,
-        sim=sim,
+        controller_name=scenario.controller_name,
+        servo=scenario.servo,
+        duration=scenario.duration,
+        sim=scenario.sim,
     )
 
     try:
-        wanted = motion.plan(robot.leg, path, alone.steps, sim.timestep)
+        wanted = motion.plan(alone.leg, path, alone.steps, alone.sim.timestep)
         asked = asked_setpoints(alone, controller, wanted)
     except (UnreachableError, SingularError) as error:
         raise type(error)(f"{leg}: {error}", error.index) from None
-    return wanted, sent_setpoints(alone, asked, wanted)
+    sent = sent_setpoints(alone, asked, wanted)
+    return Plan(alone, wanted, built, wanted.q[0], np.empty((alone.steps, 0)), sent, asked)
 
 
 def _check_duration(gait: Gait, duration: float) -> None:

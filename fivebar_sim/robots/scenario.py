@@ -1,0 +1,203 @@
+"""A robot's run as a TOML file: the robot, what its feet do, what it walks on, its limits."""
+
+from __future__ import annotations
+
+import copy
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from fivebar_sim import units
+from fivebar_sim.control import Setpoints
+from fivebar_sim.errors import ArgumentError, ConfigError, unknown
+from fivebar_sim.files import presets, tables
+from fivebar_sim.files.tables import Table
+from fivebar_sim.metrics.catalogue import GROUND_KEYS, ROBOT_KEYS, ROBOTS
+from fivebar_sim.metrics.guards import Guards
+from fivebar_sim.robots.floor import KINDS, Air, Floor
+from fivebar_sim.robots.floor import Scene as Stage
+from fivebar_sim.robots.gait import PHASES, Gait
+from fivebar_sim.robots.robot import LEGS, Robot
+from fivebar_sim.scenario import Scenario, reading
+from fivebar_sim.scenario.scenario import check_window
+
+KEYS = (
+    *("name", "robot", "scene", "duration", "path", "gait", "controller"),
+    *("sim", "guards", "limits", "converge"),
+)
+
+TRUNK_KEYS = tuple(metric.key for metric in ROBOTS)
+"""The metrics of a trunk that moves."""
+
+
+class RobotScenario(Scenario, frozen=True, kw_only=True):
+    """One run of a robot, ready to be simulated.
+
+    It has all that a leg's scenario has, of each of its legs: `leg`, `servo` and `path` are those
+    of every leg.
+
+    Attributes:
+        robot: The robot.
+        phases: By what part of a period each leg is ahead of the path.
+        strides: What the path's x is multiplied by for each leg; None: 1 for every leg.
+        scene: What the robot stands on.
+    """
+
+    robot: Robot
+    phases: dict[str, float]
+    strides: dict[str, float] | None = None
+    scene: Stage = Floor()
+
+    @property
+    def words(self) -> str:
+        """What is simulated: "robot q8bot of 220 g"."""
+        return f"robot {self.robot.name} of {units.text(1e3 * self.robot.mass, 'g')}"
+
+    @property
+    def gait(self) -> Gait:
+        """What the feet do."""
+        return Gait(path=self.path, phases=self.phases, strides=self.strides)
+
+    @classmethod
+    def from_table(cls, table: Table, where: str, folder: Path) -> RobotScenario:
+        """Return the scenario of a table; `where` names it in messages, files are under `folder`.
+
+        Raises:
+            ConfigError: A value in the table is illegal; names the key.
+        """
+        tables.check_keys(table, KEYS, where)
+        tables.check_finite(table, where)
+        name, duration = reading.name_and_duration(table, where)
+        controller_name, controller = reading.controller(table.get("controller", {}), where)
+        if not isinstance(controller, Setpoints):
+            raise ConfigError(
+                f"{where}: controller.name: a robot's controller must plan setpoints, got "
+                f"{controller_name!r}, which answers what it observes"
+            )
+
+        robot = read_robot(table["robot"], where, folder)
+        path = reading.path(table.get("path"), where, folder)
+        gait = table.get("gait", {})
+        phases, strides = _gait(gait, where)
+        scene = _scene(table.get("scene", "floor"), where)
+        scenario = cls(
+            name=name,
+            robot=robot,
+            leg=robot.leg,
+            servo=robot.servo,
+            path=path,
+            phases=phases,
+            strides=strides,
+            controller=controller,
+            controller_name=controller_name,
+            scene=scene,
+            duration=duration,
+            sim=reading.sim(table.get("sim", {}), scene, where),
+            guards=tables.convert(table.get("guards", {}), Guards, "guards", where),
+            limits=tables.bounds(table.get("limits", {}), ROBOT_KEYS, "limits", where),
+            converge=reading.converge(table.get("converge", {}), where, ROBOT_KEYS),
+        )
+        _check_together(scenario, where)
+        return scenario
+
+    def table(self) -> Table:
+        """Return the resolved scenario as a TOML table: the robot spelt out, every default written.
+
+        A CSV is named by its copy beside the table.
+        """
+        table = super().table()
+        # They are the robot's.
+        for key in ("leg", "servo", "sensors"):
+            table.pop(key)
+        changed = msgspec.structs.replace(self.robot, servo=self.servo)
+        gait = {"phases": self.phases, "strides": self.strides or dict.fromkeys(LEGS, 1.0)}
+        return {"name": table.pop("name"), "robot": changed.table(), "gait": gait, **table}
+
+
+def read_robot(value: Any, where: str, folder: Path) -> Robot:
+    """Return the robot of a preset, of a file beside the scenario, or of a table with changes.
+
+    Args:
+        value: A preset's name or a table, as the scenario has it.
+        where: The scenario, for messages.
+        folder: Where the scenario's files are.
+
+    Raises:
+        ConfigError: A value is illegal; names the key.
+    """
+    own = copy.deepcopy(value) if isinstance(value, dict) else {"preset": value}
+    preset = own.pop("preset", None)
+    if preset is None:
+        return Robot.from_table(own, f"{where}: [robot]", folder)
+    if not isinstance(preset, str) or "\0" in preset:
+        raise ConfigError(f"{where}: robot must be the name of a preset or a table, got {value!r}")
+
+    file = presets.find(folder / preset if preset.endswith(".toml") else preset, "robot")
+    try:
+        base = Robot.load(file)
+    except ConfigError as error:
+        raise ConfigError(f"{where}: robot.preset: {error}") from None
+    if not own:
+        return base
+
+    table = base.table()
+    # A leg has the rotors of its servos, unless it says otherwise itself.
+    if base.leg.armature == base.servo.armature:
+        del table["leg"]["armature"]
+    _merge(table, own)
+    return Robot.from_table(table, f"{where}: [robot]", folder)
+
+
+def _merge(table: Table, own: Table) -> None:
+    """Put changes into a table; one with a preset of its own replaces what is there."""
+    for key, value in own.items():
+        old = table.get(key)
+        if isinstance(old, dict) and isinstance(value, dict) and "preset" not in value:
+            _merge(old, value)
+        else:
+            table[key] = value
+
+
+def _gait(table: Any, where: str) -> tuple[dict[str, float], dict[str, float] | None]:
+    """Return phases and strides of the table [gait]."""
+    if not isinstance(table, dict):
+        raise ConfigError(f"{where}: gait must be a table, got {table!r}")
+    tables.check_keys(table, ("phases", "strides"), f"{where}: [gait]")
+    phases = table.get("phases", "together")
+    if isinstance(phases, str):
+        if phases not in PHASES:
+            raise ConfigError(f"{where}: gait.phases: {unknown('gait', phases, PHASES)}")
+        phases = PHASES[phases]
+
+    strides = table.get("strides")
+    for key, value in (("phases", phases), ("strides", strides)):
+        if not (isinstance(value, dict) or (value is None and key == "strides")):
+            raise ConfigError(f"{where}: gait.{key} must be a table of the legs, got {value!r}")
+    return dict(phases), strides
+
+
+def _scene(value: Any, where: str) -> Stage:
+    """Return the scene of a kind's name, such as "floor", or of a table."""
+    own = {"kind": value} if isinstance(value, str) else value
+    if not isinstance(own, dict) or "kind" not in own:
+        raise ConfigError(f"{where}: scene must be one of {', '.join(KINDS)}, got {value!r}")
+    kind = own["kind"]
+    if not isinstance(kind, str) or kind not in KINDS:
+        raise ConfigError(f"{where}: {unknown('scene of a robot', str(kind), KINDS)}")
+    return tables.convert(own, KINDS[kind], "scene", where)
+
+
+def _check_together(scenario: RobotScenario, where: str) -> None:
+    """Raise unless the tables of a scenario, each legal by itself, fit together."""
+    try:
+        scenario.gait  # noqa: B018 made for its checks
+    except ArgumentError as error:
+        raise ConfigError(f"{where}: gait.{error}") from None
+
+    check_window(scenario, where)
+    held = isinstance(scenario.scene, Air)
+    for key in scenario.limits:
+        if held and key in (*TRUNK_KEYS, *GROUND_KEYS):
+            raise ConfigError(f"{where}: limits.{key} needs a floor: scene must be 'floor'")
+    reading.check_servo_limits(scenario.limits, scenario.servo, where)
