@@ -14,13 +14,22 @@ from fivebar_sim.metrics import tracking
 from fivebar_sim.metrics.columns import Record
 from fivebar_sim.metrics.limits import Limit, judge
 from fivebar_sim.metrics.measured import Judged, Verdict, with_verdict
+from fivebar_sim.robots import measured as robots
+from fivebar_sim.robots.scenario import RobotScenario
 from fivebar_sim.runs import coarse
 from fivebar_sim.scenario import Scenario
 from fivebar_sim.simulation import feedback, measure
-from fivebar_sim.simulation.plan import Plan, period_steps, plan
+from fivebar_sim.simulation.plan import Plan, period_steps
+from fivebar_sim.simulation.plan import plan as plan_leg
 from fivebar_sim.simulation.provenance import provenance
 from fivebar_sim.simulation.recorder import Recorder
 from fivebar_sim.simulation.steps import States, Watch, simulated
+from fivebar_sim.walking.measure import measure as measure_robot
+from fivebar_sim.walking.plan import RobotPlan, plan_scenario
+from fivebar_sim.walking.walk import walk
+
+AnyPlan = Plan | RobotPlan
+"""A checked scenario of a leg or of a robot."""
 
 
 class Result(NamedTuple):
@@ -76,6 +85,8 @@ class Result(NamedTuple):
         scenario is run again in shorter steps, each time that this is read. It takes two or three
         times as long as the run itself, seldom seven times.
         """
+        if isinstance(self.scenario, RobotScenario):
+            return []
         astray = tracking.astray(self.scenario.leg, self.record, self.scenario.window)
         owed = coarse.warnings(self, run)
         return owed if astray is None else [astray, *owed]
@@ -117,6 +128,17 @@ class Kind(NamedTuple):
         )
 
 
+def plan(scenario: Scenario) -> AnyPlan:
+    """Return the plan of a scenario, without simulating anything.
+
+    Raises:
+        FiveBarError: What `simulation.plan.plan` and `walking.plan.plan` raise.
+    """
+    if isinstance(scenario, RobotScenario):
+        return plan_scenario(scenario)
+    return plan_leg(scenario)
+
+
 def run(scenario: Scenario) -> Result:
     """Return the result of one scenario.
 
@@ -127,17 +149,19 @@ def run(scenario: Scenario) -> Result:
     return execute(plan(scenario))
 
 
-def execute(planned: Plan, watch: Watch | None = None) -> Result:
+def execute(planned: AnyPlan, watch: Watch | None = None) -> Result:
     """Return the result of one plan; see `run`.
 
     Args:
         planned: The plan.
         watch: Called with the states as they come.
     """
+    if isinstance(planned, RobotPlan):
+        return _walked(planned, watch)
     return _result(planned, _recorded([planned], 1, watch)[0])
 
 
-def run_all(plans: Sequence[Plan], nthread: int = 1) -> list[Result]:
+def run_all(plans: Sequence[AnyPlan], nthread: int = 1) -> list[Result]:
     """Return the results of plans, those of one timestep and length simulated together.
 
     The bits are the same as one by one.
@@ -149,18 +173,32 @@ def run_all(plans: Sequence[Plan], nthread: int = 1) -> list[Result]:
     Raises:
         DivergedError: A simulation broke down; says which, and when.
     """
-    groups: dict[Kind, list[int]] = {}
-    for i, planned in enumerate(plans):
-        groups.setdefault(Kind.of(planned), []).append(i)
-
     # Groups mix the order of the plans; results go back to it at the end.
     results: dict[int, Result] = {}
+    groups: dict[Kind, dict[int, Plan]] = {}
+    for i, planned in enumerate(plans):
+        # A robot fills a processor by itself.
+        if isinstance(planned, RobotPlan):
+            results[i] = _walked(planned)
+        else:
+            groups.setdefault(Kind.of(planned), {})[i] = planned
+
     for members in groups.values():
-        recorders = _recorded([plans[i] for i in members], nthread)
-        for i in members:
+        recorders = _recorded([*members.values()], nthread)
+        for i, planned in members.items():
             # Each is freed once it is measured.
-            results[i] = _result(plans[i], recorders.pop(0))
+            results[i] = _result(planned, recorders.pop(0))
     return [results[i] for i in range(len(plans))]
+
+
+def _walked(planned: RobotPlan, watch: Watch | None = None) -> Result:
+    """Return what a robot did, measured and judged."""
+    went = walk(planned, watch)
+    scenario = planned.scenario
+    measured = measure_robot(went)
+    limits = judge(measured.table, scenario.limits)
+    judged = robots.with_verdict(measured, limits, provenance(scenario))
+    return Result(scenario, went.record, judged, limits)
 
 
 def _recorded(plans: Sequence[Plan], nthread: int, watch: Watch | None = None) -> list[Recorder]:

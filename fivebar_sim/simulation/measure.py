@@ -87,7 +87,7 @@ def measure(scenario: Scenario, record: Mapping[str, Array], besides: Unrecorded
     body = energy.Body(leg, scenario.payload, scenario.trunk)
     balance = energy.balance(body, record, besides.steps)
     folded = branch.measure(leg, record)
-    heated = _heating(scenario, record)
+    heated = heating_of(scenario, record)
     checked = guards.Evidence(
         bounds=scenario.guards,
         leg=leg,
@@ -111,7 +111,7 @@ def measure(scenario: Scenario, record: Mapping[str, Array], besides: Unrecorded
     return measured.of(
         catalogue.measure(leg, record, window),
         window=peaks.Window(begin=window.start * h, end=window.stop * h),
-        load=_load(scenario, record, besides, heated),
+        load=load_of(scenario, record, besides, heated),
         peaks=peaks.measure(record, window),
         whole=peaks.measure_whole(record),
         energy=energy.measure(balance),
@@ -157,7 +157,7 @@ def _footing(scenario: Scenario) -> creep.Footing | None:
     return creep.Footing(scene.friction, damping, servo.kp)
 
 
-def _heating(scenario: Scenario, record: Mapping[str, Array]) -> heat.Heating | None:
+def heating_of(scenario: Scenario, record: Mapping[str, Array]) -> heat.Heating | None:
     """Return the heat of the motors; None where the servo's table does not describe the winding."""
     winding = scenario.servo.winding
     if winding is None:
@@ -189,7 +189,7 @@ def _line(scenario: Scenario, record: Mapping[str, Array]) -> dict[str, Any]:
     return {"line": Motors(**by_motor(heat.line_used(torque, speed, limit, no_load)))}
 
 
-def _load(
+def load_of(
     scenario: Scenario,
     record: Mapping[str, Array],
     besides: Unrecorded,

@@ -1,0 +1,247 @@
+"""The Rerun recording of robots' runs: trunk and legs that move, plots, limits.
+
+Rerun is slow to import: only the functions that use it do.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from fivebar_sim.arrays import Array
+from fivebar_sim.files import file_stream
+from fivebar_sim.metrics.columns import Record
+from fivebar_sim.recording import foot, layout, rrd
+from fivebar_sim.recording import leg as legs
+from fivebar_sim.recording.check import PROPERTY
+from fivebar_sim.recording.look import GREY, Colour, Look, looks, shade
+from fivebar_sim.recording.plots import Series
+from fivebar_sim.recording.poses import Room, Rows, drawn_motion, drawn_rows
+from fivebar_sim.recording.summary import summary
+from fivebar_sim.render import palette
+from fivebar_sim.robots import LEGS, Robot, places
+from fivebar_sim.robots.columns import of_leg, trunk
+from fivebar_sim.robots.measure import Trunk, heading, lean
+from fivebar_sim.robots.scenario import RobotScenario
+from fivebar_sim.simulation.provenance import identity
+
+if TYPE_CHECKING:
+    import rerun as rr
+
+TRUNK = "trunk"
+
+COLOURS: dict[str, Colour] = {
+    leg: palette.on_any_paper(palette.RUNS[k]) for k, leg in enumerate(LEGS)
+}
+"""Colours of the legs in plots."""
+
+TURNED = (0.0, 0.0, 1.0, 0.0)
+"""Half a turn about z, as a quaternion (x, y, z, w)."""
+
+
+def write(path: Path, runs: Sequence[rrd.Run], labels: Sequence[str] = ()) -> None:
+    """Write the recording of one or more robots' runs to a .rrd file; see `rrd.write`."""
+    names = list(labels) or [run.scenario.name for run in runs]
+    with rrd.session():
+        stream = rrd.started(" + ".join(names))
+        try:
+            with path.open("wb") as file, file_stream.into(stream, file):
+                _send(stream, runs, names)
+        except BaseException:
+            # Half a recording helps nobody; a device is no file.
+            if path.is_file():
+                path.unlink()
+            raise
+
+
+def _send(stream: rr.RecordingStream, runs: Sequence[rrd.Run], names: list[str]) -> None:
+    """Send the layout, the text, the floor and all runs."""
+    import rerun as rr
+
+    shown = looks(names)
+    plots = [list(series(run.record)) for run in runs]
+    room = _room(runs)
+    text = summary(
+        names,
+        [run.measured for run in runs],
+        [run.scenario.limits for run in runs],
+        [f"{_robot(run).name}: legs {_robot(run).leg.name}" for run in runs],
+    )
+    layout.send(stream, layout.contents(room, shown, plots))
+    stream.log(layout.SUMMARY, rr.TextDocument(text, media_type="text/markdown"), static=True)
+    rrd.log_room(stream, room)
+    for run, look, own in zip(runs, shown, plots, strict=True):
+        _send_run(stream, run, look, room)
+        time = run.record["time"]
+        for plot in own:
+            for steps, part in rrd.parts(plot):
+                rrd.send_series(stream, part, look, rrd.times(time[steps - 1], steps))
+
+
+def _robot(run: rrd.Run) -> Robot:
+    assert isinstance(run.scenario, RobotScenario)
+    return run.scenario.robot
+
+
+def _send_run(stream: rr.RecordingStream, run: rrd.Run, look: Look, room: Room) -> None:
+    """Send one run: the robot's numbers and its motion, and the floor's forces."""
+    import rerun as rr
+
+    robot = _robot(run)
+    time = run.record["time"]
+    rows = drawn_rows(time)
+    drawn = rrd.times(time[rows], rows + 1)
+    # As JSON, since a plain value keeps the type that it first had.
+    stream.send_property(f"{look.root}leg", rr.AnyValues(json=json.dumps(asdict(robot.leg))))
+    own = identity(run.scenario, run.record, run.measured)
+    stream.send_property(f"{look.root}{PROPERTY}", rr.AnyValues(sha256=own))
+
+    box = rr.Boxes3D(
+        centers=[robot.trunk.center],
+        half_sizes=[[0.5 * side for side in robot.trunk.size]],
+        colors=[look.colour(GREY)],
+        labels=[look.label] if look.label else None,
+        fill_mode="majorwireframe",
+    )
+    stream.log(f"{look.root}{TRUNK}", box, static=True)
+    body = trunk(run.record)
+    if body is not None:
+        turned = body.quaternion[rows][:, [1, 2, 3, 0]]
+        poses = rr.Transform3D.columns(translation=body.position[rows], quaternion=turned)
+        stream.send_columns(f"{look.root}{TRUNK}", drawn, poses)
+    for name in LEGS:
+        _send_leg(stream, run, name, look, drawn, rows)
+        if body is not None:
+            _send_force(stream, run, name, look, drawn, rows, room)
+
+
+def _send_leg(
+    stream: rr.RecordingStream,
+    run: rrd.Run,
+    name: str,
+    look: Look,
+    drawn: list[rr.TimeColumn],
+    rows: Rows,
+) -> None:
+    """Send one leg, in the trunk's frame, and where its foot should be."""
+    import rerun as rr
+
+    robot = _robot(run)
+    hip = robot.hips[name]
+    root = f"{look.root}{TRUNK}/{name}"
+    fixed = rr.Transform3D(
+        translation=hip.pos,
+        quaternion=rr.Quaternion(xyzw=TURNED if hip.mirrored else (0.0, 0.0, 0.0, 1.0)),
+    )
+    stream.log(root, fixed, static=True)
+    record = of_leg(run.record, name)
+    # Without the ground: the hip hangs on the trunk, not on a rail.
+    moved = drawn_motion(_in_air(record), rows)
+    own = look._replace(root=f"{root}/", label=look.label and name)
+    legs.log_leg(stream, robot.leg, own)
+    legs.send_leg(stream, robot.leg, moved, own, drawn)
+    path = rr.LineStrips3D(
+        [legs.in_space(moved.target)],
+        radii=rr.Radius.ui_points(1.0),
+        colors=[look.colour(shade("target"))],
+    )
+    stream.log(f"{root}/{foot.TARGET_PATH}", path, static=True)
+
+
+def _in_air(record: Record) -> Record:
+    return {name: column for name, column in record.items() if not name.startswith("ground")}
+
+
+def _send_force(
+    stream: rr.RecordingStream,
+    run: rrd.Run,
+    name: str,
+    look: Look,
+    drawn: list[rr.TimeColumn],
+    rows: Rows,
+    room: Room,
+) -> None:
+    """Send the floor's force on a foot as an arrow, hidden while the foot is in the air."""
+    import rerun as rr
+
+    robot = _robot(run)
+    body = trunk(run.record)
+    assert body is not None
+    record = {key: column[rows] for key, column in of_leg(run.record, name).items()}
+    force = np.stack([record[f"ground_{axis}"] for axis in "xyz"], axis=-1)
+    place = places.feet(Trunk(*(each[rows] for each in body)), robot.hips[name], record)
+    down = force[:, 2] > 0.0
+    entity = f"{look.root}ground_force/{name}"
+    arrow = rr.Arrows3D.from_fields(
+        radii=[0.3 * robot.leg.radius], colors=[look.colour(shade("force"))]
+    )
+    stream.log(entity, arrow, static=True)
+    arrows = rr.Arrows3D.columns(
+        origins=place[down] - np.array([0.0, 0.0, robot.leg.foot_radius]),
+        vectors=room.metre_per_newton * force[down],
+    )
+    # Rows in the air get an empty batch: without one the last arrow would stay in sight.
+    stream.send_columns(entity, drawn, arrows.partition(down.astype(np.intp)))
+
+
+def series(record: Record) -> Iterator[Series]:
+    """Yield the plots of a robot's run, in the order in which they are shown."""
+    every = np.ones(len(record["time"]), dtype=bool)
+    body = trunk(record)
+    for motor in ("A", "E"):
+        columns = {leg: record[f"{leg}_torque_{motor}"] for leg in LEGS}
+        yield _of_legs(f"torque_{motor}", f"Torques of {motor} [mN m]", columns, 1e3)
+    errors = {
+        leg: np.hypot(
+            record[f"{leg}_foot_x"] - record[f"{leg}_target_x"],
+            record[f"{leg}_foot_z"] - record[f"{leg}_target_z"],
+        )
+        for leg in LEGS
+    }
+    yield _of_legs("tracking_error", "Tracking errors [mm]", errors, 1e3)
+    if body is None:
+        return
+
+    forces = {leg: record[f"{leg}_ground_z"] for leg in LEGS}
+    yield _of_legs("ground_force", "Vertical forces on the feet [N]", forces, 1.0)
+    height = 1e3 * body.position[:, 2:]
+    yield Series("height", "Height of the trunk [mm]", {"trunk": shade("ink")}, height, every)
+    angles = np.degrees(np.stack([lean(body.quaternion), heading(body.quaternion)], axis=-1))
+    colours = {"lean": shade("foot"), "heading": shade("A")}
+    yield Series("attitude", "Lean and heading of the trunk [deg]", colours, angles, every)
+
+
+def _of_legs(path: str, title: str, columns: dict[str, Array], scale: float) -> Series:
+    """Return a plot with a line for each leg."""
+    values = scale * np.stack([columns[leg] for leg in LEGS], axis=-1)
+    return Series(path, title, dict(COLOURS), values, np.ones(len(values), dtype=bool))
+
+
+def _room(runs: Sequence[rrd.Run]) -> Room:
+    """Return the room that all runs need."""
+    bodies = [trunk(run.record) for run in runs]
+    seen = [body.position[:, [0, 2]] for body in bodies if body is not None]
+    size = max(max(_robot(run).length, _robot(run).leg.size) for run in runs)
+    places_seen = np.concatenate([np.zeros((1, 2)), *seen])
+    margin = np.array([size, 0.0])
+
+    forces = [
+        float(np.abs(run.record[f"{leg}_ground_z"]).max())
+        for run, body in zip(runs, bodies, strict=True)
+        for leg in LEGS
+        if body is not None
+    ]
+    largest = max(forces, default=0.0)
+
+    return Room(
+        low=places_seen.min(axis=0) - margin,
+        high=places_seen.max(axis=0) + margin,
+        size=size,
+        metre_per_newton=0.5 * size / largest if largest > 0.0 else 0.0,
+        floor=bool(seen),
+    )
