@@ -51,4 +51,4 @@ def two_steps(monkeypatch: pytest.MonkeyPatch) -> None:
 def light(monkeypatch: pytest.MonkeyPatch) -> None:
     """Write no recording but its first bytes: where the whole directory goes is what is asked."""
     write = "fivebar_sim.recording.rrd.write"
-    monkeypatch.setattr(write, lambda path, runs: path.write_bytes(b"RRF2"))
+    monkeypatch.setattr(write, lambda path, runs, labels: path.write_bytes(b"RRF2"))

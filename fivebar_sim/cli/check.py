@@ -15,7 +15,7 @@ from fivebar_sim.errors import ConfigError, DivergedError, RunDirectoryError
 if TYPE_CHECKING:
     from fivebar_sim.regression.baseline import Baseline
     from fivebar_sim.regression.comparison import Checked
-    from fivebar_sim.rollout import Plan, Result
+    from fivebar_sim.rollout import AnyPlan, Result
 
 
 def check(
@@ -136,7 +136,7 @@ def _results(orders: list[Order]) -> Iterator[tuple[Result | DivergedError, str]
         yield from zip(_together([order.take() for order in batch]), names, strict=True)
 
 
-def _together(plans: list[Plan]) -> list[Result | DivergedError]:
+def _together(plans: list[AnyPlan]) -> list[Result | DivergedError]:
     """Return what comes of plans that are simulated together."""
     from fivebar_sim import rollout
 
@@ -147,7 +147,7 @@ def _together(plans: list[Plan]) -> list[Result | DivergedError]:
         return [_run_alone(planned) for planned in plans]
 
 
-def _run_alone(planned: Plan) -> Result | DivergedError:
+def _run_alone(planned: AnyPlan) -> Result | DivergedError:
     from fivebar_sim import rollout
 
     try:

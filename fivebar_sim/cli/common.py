@@ -13,7 +13,7 @@ from fivebar_sim.cli import memory, terminal
 from fivebar_sim.errors import ConfigError, FiveBarError
 
 if TYPE_CHECKING:
-    from fivebar_sim.rollout import Plan
+    from fivebar_sim.rollout import AnyPlan
     from fivebar_sim.scenario import Scenario
 
 Scenarios = Positional[Annotated[tuple[str, ...], arg(metavar="[SCENARIO ...]")]]
@@ -36,11 +36,11 @@ class Order:
         plan: Its plan; None where it would take too much memory until it is needed.
     """
 
-    def __init__(self, scenario: Scenario, plan: Plan | None) -> None:
+    def __init__(self, scenario: Scenario, plan: AnyPlan | None) -> None:
         self.scenario = scenario
         self._plan = plan
 
-    def take(self) -> Plan:
+    def take(self) -> AnyPlan:
         """Return the plan, which is then forgotten here, or make it again."""
         from fivebar_sim import rollout
 

@@ -16,7 +16,6 @@ from fivebar_sim.metrics.catalogue import SHOWN, shown
 from fivebar_sim.metrics.limits import bounds
 from fivebar_sim.metrics.measured import NOT_JUDGED
 from fivebar_sim.runs.side_by_side import side_by_side
-from fivebar_sim.scenario.leg_words import leg_words
 
 if TYPE_CHECKING:
     from fivebar_sim.regression.comparison import Checked, Compared
@@ -52,10 +51,7 @@ def print_result(result: Result, remarks: Sequence[str], where: str, console: Co
     """
     window = result.measured.window
     scenario = result.scenario
-    title = (
-        f"{scenario.name}: {leg_words(scenario.leg, scenario.servo.armature)}; "
-        f"window {window.begin:.4g} to {window.end:.4g} s"
-    )
+    title = f"{scenario.name}: {scenario.words}; window {window.begin:.4g} to {window.end:.4g} s"
     columns = ("metric", "window", "whole run", "limit", "verdict")
     table = _table(escape(title), columns)
     limits = {limit.key: limit for limit in result.limits}

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from fivebar_sim.regression.convergence import Study
-    from fivebar_sim.rollout import Plan
+    from fivebar_sim.rollout import AnyPlan
 
 
 def converge(
@@ -71,7 +71,7 @@ def converge(
 
 def _plans(
     source: str, settings: Sequence[str], halvings: int, *, alone: bool
-) -> tuple[list[Plan], list[Plan]]:
+) -> tuple[list[AnyPlan], list[AnyPlan]]:
     """Return the plans under the scenario's integrator, and under the other one."""
     from fivebar_sim.cli import memory
     from fivebar_sim.errors import ConfigError
@@ -91,7 +91,7 @@ def _plans(
         raise ConfigError(f"{source}: {error}") from None
 
 
-def _other(planned: list[Plan]) -> Study | None:
+def _other(planned: list[AnyPlan]) -> Study | None:
     """Return the study under the other integrator; None without plans, or where it breaks down."""
     from fivebar_sim.regression import convergence
 

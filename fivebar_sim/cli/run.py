@@ -50,8 +50,23 @@ def run(
     # A place that cannot be written must not cost a simulation first.
     for place in places:
         directory.check_place(place)
-    viewer = _viewer(live_at) if live or live_at is not None else None
+    shown = live or live_at is not None
+    if shown:
+        _check_live(orders)
+    viewer = _viewer(live_at) if shown else None
     return _run(orders, places, viewer, quiet=quiet, as_json=json)
+
+
+def _check_live(orders: list[Order]) -> None:
+    """Raise if a run cannot be shown while it is simulated."""
+    from fivebar_sim.robots.scenario import RobotScenario
+
+    for order in orders:
+        if isinstance(order.scenario, RobotScenario):
+            raise ConfigError(
+                f"--live shows runs of legs, and {order.scenario.name} is a robot's: `fivebar "
+                "replay` shows it afterwards"
+            )
 
 
 def _viewer(address: str | None) -> str:
@@ -78,6 +93,7 @@ def _execute(order: Order, viewer: str | None, place: Path) -> Result:
     from fivebar_sim.recording import live
 
     planned = order.take()
+    assert isinstance(planned, rollout.Plan)
     with live.streaming(planned, viewer) as watch:
         result = rollout.execute(planned, watch)
         # Before the viewer has everything: one that has stalled must not cost the result.

@@ -119,7 +119,7 @@ def holds(found: Convergence, bar: float, tolerance: float) -> bool:
     return abs(found.value - found.limit) <= tolerance
 
 
-def plans(scenario: Scenario, halvings: int, integrator: Integrator) -> list[rollout.Plan]:
+def plans(scenario: Scenario, halvings: int, integrator: Integrator) -> list[rollout.AnyPlan]:
     """Return the plans at h, h / 2, ...; see `refined`.
 
     Raises:
@@ -130,7 +130,7 @@ def plans(scenario: Scenario, halvings: int, integrator: Integrator) -> list[rol
     return [rollout.plan(refined(scenario, 2**n, integrator)) for n in range(halvings + 1)]
 
 
-def study(planned: Sequence[rollout.Plan]) -> Study:
+def study(planned: Sequence[rollout.AnyPlan]) -> Study:
     """Return how the metrics of plans at h, h / 2, ... converge.
 
     Raises:
@@ -149,7 +149,7 @@ def study(planned: Sequence[rollout.Plan]) -> Study:
     )
 
 
-def _executed(planned: rollout.Plan) -> rollout.Result:
+def _executed(planned: rollout.AnyPlan) -> rollout.Result:
     try:
         return rollout.execute(planned)
     except DivergedError as error:

@@ -19,7 +19,7 @@ from fivebar_sim.errors import RunDirectoryError
 from fivebar_sim.files import exchange, leftovers, whole_file
 from fivebar_sim.metrics.columns import digest
 from fivebar_sim.recording import rrd
-from fivebar_sim.runs import checksums
+from fivebar_sim.runs import checksums, recorded
 from fivebar_sim.runs.kept import DIVERGED, FILES, keep, own_names
 
 RECORDING = "recording.rrd"
@@ -173,7 +173,7 @@ def _fill(stage: Path, result: rrd.Run) -> None:
     # Last of these: it has the checksums of the others.
     others = ["scenario.toml", "metrics.json", *scenario.files]
     write_record(stage, result.record, others)
-    rrd.write(stage / RECORDING, [result])
+    recorded.write(stage / RECORDING, [result])
 
 
 def write_record(folder: Path, record: Mapping[str, Array], others: Iterable[str]) -> None:

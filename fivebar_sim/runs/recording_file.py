@@ -11,8 +11,8 @@ from importlib.metadata import version
 from pathlib import Path
 
 from fivebar_sim.errors import ConfigError
-from fivebar_sim.recording import check, rrd
-from fivebar_sim.runs import stored
+from fivebar_sim.recording import check
+from fivebar_sim.runs import recorded, stored
 from fivebar_sim.simulation.provenance import identity
 
 RECORDING = "recording.rrd"
@@ -41,7 +41,7 @@ def opened(paths: Sequence[Path]) -> Iterator[Path]:
             yield _own(runs[0], Path(folder))
             return
         file = Path(folder) / RECORDING
-        rrd.write(file, runs, labels)
+        recorded.write(file, runs, labels)
         yield file
 
 
@@ -70,14 +70,14 @@ def _own(run: stored.StoredRun, folder: Path) -> Path:
     except OSError:
         # The run lies where the user may not write: the recording then lasts as long as its viewer.
         file = folder / RECORDING
-        rrd.write(file, [run])
+        recorded.write(file, [run])
         return file
 
     # Written beside and renamed, so that an interrupt never leaves half a recording.
     os.close(handle)
     beside = Path(name)
     try:
-        rrd.write(beside, [run])
+        recorded.write(beside, [run])
         beside.chmod(0o644)
         beside.replace(own)
     finally:

@@ -22,6 +22,9 @@ from fivebar_sim.metrics.columns import (
 )
 from fivebar_sim.metrics.limits import has
 from fivebar_sim.metrics.measured import Judged
+from fivebar_sim.robots import LEGS, Floor
+from fivebar_sim.robots.columns import columns as robots_columns
+from fivebar_sim.robots.scenario import RobotScenario
 from fivebar_sim.runs import checksums, directory, stored_metrics
 from fivebar_sim.scenario import Scenario
 from fivebar_sim.scenario.scenes import Ground, Treadmill
@@ -80,8 +83,9 @@ def read(path: Path) -> StoredRun:
 
     _check_plausible(file, record, scenario.sim.timestep)
     checksums.check_record(file, record, sums)
-    grounded = isinstance(scenario.scene, Ground)
-    measured = stored_metrics.read(path / "metrics.json", grounded=grounded)
+    robot = isinstance(scenario, RobotScenario)
+    grounded = isinstance(scenario.scene, Ground | Floor)
+    measured = stored_metrics.read(path / "metrics.json", grounded=grounded, robot=robot)
     for key in scenario.limits:
         # What only some servos have is no field that every run must have.
         if not has(measured.table, key):
@@ -116,7 +120,9 @@ def _check_plausible(file: Path, record: Record, timestep: float) -> None:
         )
 
     for name, column in record.items():
-        most = next((high for part, high in MOST.items() if name.startswith(part)), LARGEST)
+        # A leg of a robot has its name in front.
+        own = name.partition("_")[2] if name.partition("_")[0] in LEGS else name
+        most = next((high for part, high in MOST.items() if own.startswith(part)), LARGEST)
         far = np.abs(column) > most
         if far.any():
             k = int(np.argmax(far))
@@ -126,8 +132,15 @@ def _check_plausible(file: Path, record: Record, timestep: float) -> None:
             )
 
 
+def _common_columns(scenario: Scenario) -> list[str]:
+    """Return the columns that every record of a leg has, or all of a robot's."""
+    if isinstance(scenario, RobotScenario):
+        return robots_columns(scenario.scene)
+    return list(COLUMNS)
+
+
 def _own_columns(scenario: Scenario) -> list[str]:
-    """Return the columns that the scenario's scene adds."""
+    """Return the columns that a leg's scene adds."""
     columns = []
     if isinstance(scenario.scene, Ground):
         columns += [*HIP_COLUMNS, *GROUND_COLUMNS, RAIL_COLUMN]
@@ -161,7 +174,7 @@ def _record(file: Path, parquet: ParquetFile, scenario: Scenario) -> Record:
     """Return the columns of a scenario's record."""
     # Before the rows: some megabytes can hold a thousand times as much.
     _check_layout(file, parquet, scenario)
-    table = parquet.read(columns=[*COLUMNS, *_own_columns(scenario)])
+    table = parquet.read(columns=[*_common_columns(scenario), *_own_columns(scenario)])
     record: Record = {}
     for name in table.column_names:
         column = table[name]
@@ -184,7 +197,7 @@ def _check_layout(file: Path, parquet: ParquetFile, scenario: Scenario) -> None:
 
     schema = parquet.schema_arrow
     own = _own_columns(scenario)
-    for name in (*COLUMNS, *own):
+    for name in (*_common_columns(scenario), *own):
         if name not in schema.names:
             of = f" of the scene {scenario.scene.kind!r}" if name in own else ""
             raise RunDirectoryError(f"{file} is not a record{of}: it lacks the column {name}")

@@ -12,14 +12,16 @@ from fivebar_sim.errors import RunDirectoryError
 from fivebar_sim.files import input_file, tables
 from fivebar_sim.metrics import measured
 from fivebar_sim.metrics.measured import Judged, Verdict
+from fivebar_sim.robots import measured as robots
 
 
-def read(file: Path, *, grounded: bool) -> Judged:
+def read(file: Path, *, grounded: bool, robot: bool = False) -> Judged:
     """Return all of metrics.json, checked.
 
     Args:
         file: The metrics.json of a run directory.
         grounded: Whether the run was in a scene with a ground, which has metrics of its own.
+        robot: Whether it was a robot's.
 
     Raises:
         RunDirectoryError: It cannot be read, is not JSON, lacks a key, has an unknown one, or a
@@ -37,7 +39,7 @@ def read(file: Path, *, grounded: bool) -> Judged:
         raise RunDirectoryError(f"{file} is not of a run: nested too deep")
 
     try:
-        found = measured.read(metrics)
+        found = robots.read(metrics) if robot else measured.read(metrics)
     except msgspec.ValidationError as error:
         raise RunDirectoryError(f"{file}: {_explain(str(error), metrics)}") from None
 
