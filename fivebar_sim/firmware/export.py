@@ -6,9 +6,9 @@ import json
 import os
 import shutil
 import tempfile
+from importlib.metadata import version
 from pathlib import Path
 
-import fivebar_sim
 from fivebar_sim.errors import ConfigError
 from fivebar_sim.files import resources
 from fivebar_sim.files.exchange import exchange
@@ -130,7 +130,7 @@ def _platformio() -> str:
     """Return library.json."""
     library = {
         "name": "fivebar_leg",
-        "version": fivebar_sim.__version__,
+        "version": version("fivebar-sim"),
         "description": SUMMARY,
         "keywords": "robotics, kinematics, quadruped, five-bar",
         "license": "Apache-2.0",
@@ -146,7 +146,7 @@ def _arduino() -> str:
     """Return library.properties."""
     lines = {
         "name": "fivebar_leg",
-        "version": fivebar_sim.__version__,
+        "version": version("fivebar-sim"),
         "author": "fivebar-sim",
         "maintainer": "fivebar-sim",
         "sentence": f"{SUMMARY}.",

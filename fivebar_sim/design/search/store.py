@@ -12,12 +12,12 @@ import hashlib
 import json
 import shutil
 from collections.abc import Iterator
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-import fivebar_sim
 from fivebar_sim.design.evaluation.evaluate import Evaluated, columns
 from fivebar_sim.design.evaluation.measures import limits
 from fivebar_sim.design.search.front import Front
@@ -161,7 +161,7 @@ class Store:
 def fingerprint(task: Task) -> str:
     """Return a digest of all that a search depends on: the task, its files and the version."""
     digest = hashlib.sha256(json.dumps(task.table, sort_keys=True).encode())
-    digest.update(fivebar_sim.__version__.encode())
+    digest.update(version("fivebar-sim").encode())
     digest.update(repr((task.leg, task.servos)).encode())
     for motion in task.motions:
         for part in (motion.path, motion.force):
