@@ -42,17 +42,18 @@ def read_through(path: Path) -> str | None:
     Raises:
         Exception: Any, if Rerun cannot read it.
     """
-    from rerun.chunk import RrdReader
+    # What rerun.chunk is made of, without all of Rerun: a sixth of the time to start.
+    from rerun_bindings import RrdReaderInternal
 
     run = None
 
     with warnings.catch_warnings():
         # A recording that was cut off has no footer, and the reader warns of that.
         warnings.simplefilter("ignore")
-        reader = RrdReader(path)
+        reader = RrdReaderInternal(str(path))
         # The store opens only with a whole footer; the stream finds every other damage.
-        reader.store()
-        for chunk in reader.stream():
+        reader.store(store=None)
+        for chunk in reader.stream(store=None):
             if chunk.entity_path == f"/__properties/{PROPERTY}":
                 run = chunk.to_record_batch()["sha256"].to_pylist()[0][0]
     return run
