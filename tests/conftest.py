@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 from pathlib import Path
 
 import numpy as np
@@ -24,6 +25,16 @@ settings.register_profile(
     "random", settings.get_profile("repeatable"), derandomize=False, max_examples=400
 )
 settings.load_profile("repeatable")
+
+
+def pytest_collection_finish() -> None:
+    """Keep the collector from going through all that was imported and collected, again and again.
+
+    None of it will ever be garbage, and it is a million objects.
+    """
+    gc.collect()
+    gc.freeze()
+    gc.set_threshold(10_000, 20, 20)
 
 
 @pytest.fixture
