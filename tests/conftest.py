@@ -43,8 +43,17 @@ def rng() -> np.random.Generator:
 
 
 @pytest.fixture
+def without_pandas(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Have programs that are started find no pandas, which the least set-up lacks too."""
+    monkeypatch.setenv("PYTHONPATH", str(Path(__file__).with_name("without_pandas")))
+
+
+@pytest.fixture
 def shell(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    without_pandas: None,
 ) -> Shell:
     monkeypatch.chdir(tmp_path)
     (tmp_path / "short.toml").write_text(JUDGED, encoding="utf-8")
