@@ -83,7 +83,7 @@ class Result(NamedTuple):
 
         The foot does not follow its path, or numbers owe something to the timestep: for that the
         scenario is run again in shorter steps, each time that this is read. It takes two or three
-        times as long as the run itself, seldom seven times.
+        times as long as the run itself, seldom ten times.
         """
         if isinstance(self.scenario, RobotScenario):
             return []

@@ -8,7 +8,7 @@ import pytest
 
 from fivebar_sim.control import Feedback
 from fivebar_sim.errors import ConfigError
-from fivebar_sim.regression.convergence import Convergence, converge, holds
+from fivebar_sim.runs.extrapolation import Convergence, converge, holds
 from fivebar_sim.scenario import Scenario
 from fivebar_sim.scenario.refined import refined
 

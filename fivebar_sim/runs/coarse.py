@@ -1,8 +1,8 @@
 """Warnings that a run's numbers owe something to its timestep, where no guard fails it for that.
 
-A run is taken again at half its timestep and, where that leaves a doubt, at a quarter. What costs
-less is in the record of the run itself, but no such sign saw all runs that were off: they only say
-why, where one of them shows.
+A run is taken again at half its timestep and, where that leaves a doubt, at a quarter, from where
+its metrics are extrapolated. What costs less is in the record of the run itself, but no such sign
+saw all runs that were off: they only say why, where one of them shows.
 """
 
 from __future__ import annotations
@@ -19,12 +19,13 @@ from fivebar_sim.metrics.catalogue import ABSOLUTE, SHOWN, shown
 from fivebar_sim.metrics.columns import MOTORS, Record, motors
 from fivebar_sim.metrics.limits import Limit, look_up
 from fivebar_sim.metrics.measured import Judged
+from fivebar_sim.runs.extrapolation import converge
 from fivebar_sim.scenario import Scenario
 from fivebar_sim.scenario.refined import refined, shortened
 from fivebar_sim.scenario.scenes import Ground
 
 BAR = 0.05
-"""Largest part by which a metric may differ in shorter steps."""
+"""Largest part of a metric that the timestep may cause."""
 
 DOUBT = 0.2
 """Part of what is allowed from which on half a timestep is not enough, and a quarter is tried.
@@ -115,6 +116,7 @@ def warnings(result: Run, again: Callable[[Scenario], Run]) -> list[str]:
     begun = shortened(scenario, LONGEST)
     first = result if begun is scenario else again(begun)
     said = "" if begun is scenario else f", in the first {begun.duration:g} s,"
+    tables = [first.metrics]
     for parts, part in PARTS.items():
         when = f"at {part} of it{said}"
         try:
@@ -126,12 +128,15 @@ def warnings(result: Run, again: Callable[[Scenario], Run]) -> list[str]:
         if fails:
             return [f"the timestep is too long: {when} the run fails: {'; '.join(fails)}"]
 
-        found = differences(scenario, first.metrics, finer.metrics)
+        tables.append(finer.metrics)
+        found = differences(scenario, tables)
         off = [each for each in found if each.used > 1.0]
         if off:
-            named = ", ".join(_named(off))
+            run_there = parts == min(PARTS)
+            where = when if run_there else f"with ever shorter ones{said}"
+            named = ", ".join(_named(off, "is" if run_there else "is about"))
             why = "".join(f"; {each}" for each in _reasons(first))
-            return [f"numbers depend on the timestep: {when} {named}{why}"]
+            return [f"numbers depend on the timestep: {where} {named}{why}"]
         if not any(each.doubtful for each in found):
             return []
     return []
@@ -142,8 +147,8 @@ class Difference(NamedTuple):
 
     Attributes:
         key: Its dotted key.
-        was: Its value before.
-        now: In shorter steps.
+        was: Its value.
+        now: In shorter steps; from a quarter on, in ever shorter ones.
         used: The difference, as a part of what is allowed.
         doubtful: Whether it may be more than that in yet shorter steps.
     """
@@ -155,25 +160,23 @@ class Difference(NamedTuple):
     doubtful: bool
 
 
-def differences(
-    scenario: Scenario, was: Mapping[str, Any], now: Mapping[str, Any]
-) -> list[Difference]:
+def differences(scenario: Scenario, tables: Sequence[Mapping[str, Any]]) -> list[Difference]:
     """Return how metrics differ.
 
-    Allowed is a part of the second run's, `BAR` or what the scenario's table [converge] says, or
+    Allowed is a part of the finer value, `BAR` or what the scenario's table [converge] says, or
     next to nothing.
 
     Args:
         scenario: The scenario that was run.
-        was: The metrics of a run.
-        now: Those of one in shorter steps.
+        tables: The metrics of a run, and those at half its timestep, or at half and a quarter.
     """
     found = []
     for key in dict.fromkeys((*WATCHED, *scenario.limits)):
-        before = look_up(was, key)
-        after = look_up(now, key)
-        if before is None or after is None or key in NUMERICAL:
+        values = [value for value in (look_up(table, key) for table in tables) if value is not None]
+        if len(values) < len(tables) or key in NUMERICAL:
             continue
+        before = values[0]
+        after = _end(values)
         change = abs(before - after)
         size = abs(after)
         near = NEAR * scenario.leg.size if key.startswith("tracking.") else ABSOLUTE.get(key, 0.0)
@@ -184,7 +187,15 @@ def differences(
     return found
 
 
-def _named(off: Sequence[Difference]) -> Iterator[str]:
+def _end(values: Sequence[float]) -> float:
+    """Return what a metric at h and h / 2, or at h, h / 2 and h / 4, comes to."""
+    first, *finer = values
+    limit = converge(values).limit if len(finer) > 1 else None
+    # What does not converge is as far away as it was seen.
+    return max(finer, key=lambda value: abs(value - first)) if limit is None else limit
+
+
+def _named(off: Sequence[Difference], verb: str) -> Iterator[str]:
     """Yield what metrics are in shorter steps, and what they were."""
     seen = set()
     for key, was, now, *_ in off:
@@ -194,7 +205,7 @@ def _named(off: Sequence[Difference]) -> Iterator[str]:
         seen.add((was, now))
         part = 100.0 * abs(was - now) / abs(now) if now else np.inf
         by = f"{part:.0f}" if part > 10.0 else f"{part:.2g}"
-        yield f"{SHOWN[key][0]} is {shown(key, now)}, not {shown(key, was)} ({by} % off)"
+        yield f"{SHOWN[key][0]} {verb} {shown(key, now)}, not {shown(key, was)} ({by} % off)"
 
 
 def _flipped(first: Run, finer: Run) -> Iterator[str]:
