@@ -15,7 +15,7 @@ def export(
     *,
     c: Annotated[str | None, arg(metavar="DIR")] = None,
 ) -> int:
-    """Write a leg for other programs: as a C library for a microcontroller.
+    """Write a leg as a C library for a microcontroller.
 
     docs/firmware.md has what the library can do.
 

@@ -175,6 +175,7 @@ def direction(z: Real, x: Real) -> Real:
     angle = np.where(high > wide, half * pi - (angle - half * rest), angle)
     angle = np.where(x < 0.0, pi - (angle - rest), angle)
     angle = np.where((z < 0.0) & (angle < pi), -angle, angle)
+
     return np.where(nowhere, x.dtype.type(0.0), angle)
 
 

@@ -47,6 +47,7 @@ def header(leg: FiveBar) -> str:
         f"{_constant(servo.high)}, {servo.first}, {servo.last}}};\n"
         for side, servo in zip("AE", servos_of(rows), strict=True)
     )
+
     return (
         "/* A gait of one second, one row of (theta_A, theta_E) [rad] every 20 ms. */\n"
         "#include <fivebar_leg.h>\n\n"

@@ -139,6 +139,7 @@ def _platformio() -> str:
         "headers": HEADER,
         "examples": [{"name": "play_gait", "base": "examples/play_gait", "files": ["*.*"]}],
     }
+
     return json.dumps(library, indent=2) + "\n"
 
 
@@ -156,4 +157,5 @@ def _arduino() -> str:
         "architectures": "*",
         "includes": HEADER,
     }
+
     return "".join(f"{key}={value}\n" for key, value in lines.items())

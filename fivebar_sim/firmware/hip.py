@@ -113,6 +113,7 @@ def hip_forward(
     else:
         u = along + z
         F = np.stack([x, across * c - u * s, across * s + u * c], axis=-1)
+
     return np.where(good[..., None], F, kind(np.nan)), status
 
 

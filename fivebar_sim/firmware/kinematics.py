@@ -72,6 +72,7 @@ def inverse(leg: Leg, foot: ArrayLike, s_A: ArrayLike, s_E: ArrayLike) -> tuple[
         theta = np.stack(
             [direction(e_A[..., 1], e_A[..., 0]), direction(e_E[..., 1], e_E[..., 0])], axis=-1
         )
+
     return _only(theta, then(wrong, status))
 
 
@@ -127,6 +128,7 @@ def reaches(leg: Leg, foot: ArrayLike, s_A: ArrayLike = 0) -> Statuses:
         minus = cranks(leg, F, -one, one)[2] == Status.OK
         plus = cranks(leg, F, one, one)[2] == Status.OK
     held = ((signs != 1) & minus) | ((signs != -1) & plus)
+
     return first_of(
         (~is_finite(F), Status.NOT_FINITE),
         (~((signs == 0) | _is_sign(signs)), Status.BAD_ARGUMENT),
@@ -269,6 +271,7 @@ def _crank(chain: Chain, r: Real, s: NDArray[Any]) -> tuple[Real, Real, Statuses
     e_x = np.where(on_motor, kind(1.0), x * n - z * root)
     e_z = np.where(on_motor, kind(0.0), z * n + x * root)
     status = first_of((~_spans(chain, d2), Status.UNREACHABLE))
+
     return np.stack([e_x, e_z], axis=-1), d2, status
 
 

@@ -152,6 +152,7 @@ def _status(
     links = [r[key] for key in LENGTHS[:4]]
     infinite = [~np.isfinite(value) for value in r.values()]
     unsigned = [(s != 1) & (s != -1) for s in signs.values()]
+
     return first_of(
         (np.any(infinite, axis=0), Status.NOT_FINITE),
         (np.any(unsigned, axis=0), Status.BAD_ARGUMENT),
@@ -169,6 +170,7 @@ def _chain(near: Real, far: Real, slack: Real) -> Chain:
     outer = near + far
     hole = np.where(inner > slack, inner - slack, slack.dtype.type(0.0))
     reach = outer + slack
+
     return Chain(
         inner=inner,
         outer=outer,

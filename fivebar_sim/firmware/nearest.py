@@ -103,6 +103,7 @@ def _corners(leg: Leg, r_A: Real, r_E: Real) -> Iterator[Real]:
     a = kind(0.5) * d + total * gap / (two * d)
     h = square_root(h2) / (two * d)
     u = -two * A / d[..., None]
+
     for side in (-1.0, 1.0):
         across = kind(side) * h
         x = A[..., 0] + (a * u[..., 0] - across * u[..., 1])

@@ -70,6 +70,7 @@ def servo_command(
         status = then(status, first_of((far | beyond, Status.OUT_OF_LIMITS)))
         whole = np.trunc(np.where(status == Status.OK, steps, kind(0.0)) + kind(0.5))
     command = np.int32(servo.first) + whole.astype(np.int32)
+
     return np.where(status == Status.OK, command, np.int32(0)), status
 
 
@@ -97,6 +98,7 @@ def servo_angle(
     status = then(status, first_of((far, Status.OUT_OF_LIMITS)))
     pi = kind(numbers(near).pi)
     theta = np.where((near <= -pi) | (near > pi), pi, near)
+
     return np.where(status == Status.OK, theta, kind(np.nan)), status
 
 

@@ -59,6 +59,7 @@ def _fields(leg: Leg) -> str:
         (_chain(leg.knee_knee), "knee_knee"),
     ]
     lines = [f"    {values}, /* {name} */\n" for values, name in rows]
+
     return "".join([*lines, f"    {number(leg.apart2)} /* apart2 */\n"])
 
 
