@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -126,7 +127,7 @@ def test_a_file_in_the_place_is_refused(tmp_path: Path) -> None:
     ],
 )
 def test_a_leg_that_float_cannot_hold_is_refused(
-    keys: dict[str, float], told: str, tmp_path: Path
+    keys: dict[str, Any], told: str, tmp_path: Path
 ) -> None:
     leg = FiveBar(**keys, scale="any", name="odd")
     with pytest.raises(GeometryError, match=f"cannot hold the leg odd.*{told}"):

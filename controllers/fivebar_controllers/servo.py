@@ -7,7 +7,7 @@ from typing import Literal
 import msgspec
 import numpy as np
 
-from fivebar_sim import dynamics
+from fivebar_sim import dynamics, firmware
 from fivebar_sim.arrays import Array
 from fivebar_sim.control.servo import Servo as ServoGains
 from fivebar_sim.geometry import FiveBar
@@ -35,11 +35,16 @@ class Servo(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
     `dynamics.step_torques`. Under `implicitfast` the loop opens by tens of micrometres: the third
     law follows `dynamics.soft_loop`, which keeps the foot on its path nevertheless.
 
+    With `arithmetic` "float32" theta* is what the exported C code would compute, bit for bit (see
+    `firmware`), so that its rounding is part of the run; theta_dot* are the differences of that.
+
     Attributes:
         feedforward: "none", "velocity" or "torque".
+        arithmetic: "float64", or "float32" as on a microcontroller.
     """
 
     feedforward: Literal["none", "velocity", "torque"] = "none"
+    arithmetic: Literal["float64", "float32"] = "float64"
 
     def setpoints(
         self, leg: FiveBar, servo: ServoGains, motion: Motion, integrator: Integrator
@@ -49,6 +54,8 @@ class Servo(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
         Raises:
             SingularError, DivergedError: With "torque", where the loop of `implicitfast` cannot
                 follow the motion; see `dynamics.soft_loop`.
+            GeometryError, UnreachableError: With "float32", where the firmware cannot hold the leg
+                or does not reach the path.
         """
         q = motion.q
         h = motion.timestep
@@ -57,11 +64,15 @@ class Servo(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
         if self.feedforward == "torque" and integrator == "implicitfast":
             q = dynamics.soft_loop(leg, q, h, servo.damping, payload=payload)
 
+        sent = q[:, MOTOR_JOINTS]
+        if self.arithmetic == "float32":
+            sent = sent + firmware.rounding(leg, motion.foot, motion.q[:, MOTOR_JOINTS])
+
         # The spring of `discrete` acts at the end of the step, that of `implicitfast` at its start.
         rows = slice(1, None) if integrator == "discrete" else slice(None, -1)
-        u = q[rows][:, MOTOR_JOINTS]
+        u = sent[rows]
         if self.feedforward != "none":
-            rate = np.diff(q[:, MOTOR_JOINTS], axis=0) / h
+            rate = np.diff(sent, axis=0) / h
             u = u + (servo.damping / servo.kp) * rate
 
         if self.feedforward == "torque":

@@ -15,6 +15,7 @@ from fivebar_sim.firmware.kinematics import (
 )
 from fivebar_sim.firmware.leg import Leg, of, prepare
 from fivebar_sim.firmware.nearest import nearest
+from fivebar_sim.firmware.rounding import rounding
 from fivebar_sim.firmware.servo import FirmwareServo, gait_at, servo_angle, servo_command
 from fivebar_sim.firmware.status import Status
 
@@ -38,6 +39,7 @@ __all__ = [
     "of",
     "prepare",
     "reaches",
+    "rounding",
     "servo_angle",
     "servo_command",
     "torque",
