@@ -7,44 +7,21 @@ from __future__ import annotations
 
 import os
 import shutil
-import subprocess
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
+from page_sight import CLASSIC, SMALL, TOO_WIDE, Sight, compiled, drawn, is_right
 from test_report_browser import missing
 
 from fivebar_sim import kinematics, page, rollout
-from fivebar_sim.analysis import singularity
 from fivebar_sim.geometry import FiveBar
 from fivebar_sim.scenario import Scenario
 
 if TYPE_CHECKING:
-    from playwright.sync_api import Browser, Page
-
-ROOT = Path(__file__).resolve().parents[1]
-CLASSIC = FiveBar.load("classic")
-EPS = 2.0**-23
-
-STATE = """() => {
-    const { state, stats, path, hands, map } = fivebar;
-    const { pose, foot, force, signs, lengths, target, distances } = state;
-    return { pose, foot, force, signs, lengths, target, distances, stats, done: map.done,
-        rows: path.rows.length, playing: path.playing, places: hands.places(),
-        said: document.getElementById("status").textContent };
-}"""
-
-TOO_WIDE = """() => [...document.querySelectorAll('main *')].filter(element => {
-    const box = element.getBoundingClientRect();
-    return box.width > 0 && (box.right > innerWidth + 1 || box.left < -1);
-}).map(element => element.id || element.className || element.tagName)"""
-
-SMALL = """() => [...document.querySelectorAll('button:not(.handle), .segments span, label')]
-    .filter(one => !one.closest('.slider'))
-    .filter(one => one.getBoundingClientRect().height > 0)
-    .filter(one => one.getBoundingClientRect().height < 28).map(one => one.textContent)"""
+    from playwright.sync_api import Browser
 
 
 @pytest.fixture(scope="module")
@@ -71,77 +48,46 @@ def places(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     return {path.stem: path for path in folder.iterdir()}
 
 
-class Sight:
-    """A page in a tab, and everything that it says or asks for."""
-
-    def __init__(self, browser: Browser, place: Path, **options: Any) -> None:
-        wanted = {"viewport": {"width": 1280, "height": 900}, "color_scheme": "light"} | options
-        self.context = browser.new_context(**wanted)
-        self.page: Page = self.context.new_page()
-        self.said: list[str] = []
-        self.page.on("console", lambda message: self.said.append(message.text))
-        self.page.on("pageerror", lambda error: self.said.append(str(error)))
-        self.page.on("request", lambda request: self.said.append(request.url))
-        self.page.goto(place.as_uri(), wait_until="load")
-        self.settle()
-
-    def settle(self) -> dict[str, Any]:
-        """Return the state once everything has been drawn."""
-        for _ in range(400):
-            if self.page.evaluate("Boolean(window.fivebar && fivebar.stats.frames)"):
-                state = self.page.evaluate(STATE)
-                if state["done"] and not self.page.evaluate("fivebar.dirty"):
-                    return state
-            self.page.wait_for_timeout(25)
-        raise AssertionError("the page never came to rest")
-
-    def view(self, pixel: list[float]) -> tuple[float, float]:
-        """Return where a pixel of the picture is in the window."""
-        box = self.page.locator(".view").bounding_box()
-        assert box
-        return box["x"] + 1 + pixel[0], box["y"] + 1 + pixel[1]
-
-    def pixel(self, point: list[float]) -> tuple[float, float]:
-        """Return where a point of the leg's plane is in the window."""
-        return self.view(self.page.evaluate("p => fivebar.view.pixel(p)", point))
-
-
-@pytest.fixture
-def classic(browser: Browser, places: dict[str, Path]) -> Iterator[Sight]:
+@pytest.fixture(scope="module")
+def opened(browser: Browser, places: dict[str, Path]) -> Iterator[Sight]:
     sight = Sight(browser, places["classic"])
     yield sight
-    assert sight.said == [places["classic"].as_uri()]
     sight.context.close()
 
 
-def is_right(leg: FiveBar, state: dict[str, Any]) -> None:
-    """Check a pose against the kinematics in double precision, within some roundings of float32."""
-    pose = state["pose"]
-    theta = kinematics.inverse(leg, state["foot"], tuple(state["signs"]))
-    # 16 roundings of the leg's size, over the length that turns; tests stay away from the edge.
-    angle = 16 * EPS * leg.size / min(leg.L1, leg.L4) * 8
-    np.testing.assert_allclose(pose["theta"], theta, rtol=0, atol=angle)
-    J = kinematics.jacobian(leg, theta, int(pose["assembly"]))
-    np.testing.assert_allclose(np.reshape(pose["J"], (2, 2)), J, rtol=0, atol=4 * angle)
-    force = np.array(state["force"])
-    np.testing.assert_allclose(pose["tau"], -J.T @ force, rtol=0, atol=40 * angle)
-    far = singularity.distances(leg, theta, assembly=int(pose["assembly"]))
-    shown = [state["distances"][key] for key in ("A", "E", "loop")]
-    np.testing.assert_allclose(shown, np.abs(far), rtol=0, atol=angle)
+@pytest.fixture
+def classic(opened: Sight, places: dict[str, Path]) -> Iterator[Sight]:
+    """Return the page as it begins; opening it anew for each test takes most of the time."""
+    opened.page.keyboard.press("Escape")
+    opened.page.click("#reset")
+    opened.settle()
+    yield opened
+    assert opened.said == [places["classic"].as_uri()]
 
 
 @pytest.mark.parametrize("name", ["classic", "extended", "airhockey"])
-def test_page_is_alone_right_and_fits(browser: Browser, places: dict[str, Path], name: str) -> None:
+def test_page_is_alone_right_and_fits(
+    browser: Browser, places: dict[str, Path], name: str, tmp_path: Path
+) -> None:
     sight = Sight(browser, places[name])
-    is_right(FiveBar.load(name), sight.settle())
-    for width in (390, 1280):
-        sight.page.set_viewport_size({"width": width, "height": 844})
-        for which in ("inverse", "forward", "none"):
-            sight.page.click(f"input[value={which}] + span")
+    leg = FiveBar.load(name)
+    is_right(leg, sight.settle())
+    for which in ("forward", "inverse"):
+        sight.page.click(f"input[value={which}] + span")
+        for width in (390, 1280):
+            sight.page.set_viewport_size({"width": width, "height": 844})
             sight.settle()
             assert sight.page.evaluate("document.documentElement.scrollWidth") <= width
             assert sight.page.evaluate(TOO_WIDE) == []
             assert sight.page.evaluate(SMALL) == []
+
+    # Without a path of one's own: a scenario all the same, of this very leg.
+    sight.page.click("#copy-scenario")
+    file = tmp_path / "scenario.toml"
+    file.write_text(sight.page.input_value("#given-text"), encoding="utf-8")
+    scenario = Scenario.load(file)
+    assert scenario.leg == leg
+    rollout.plan(scenario)
     assert sight.said == [places[name].as_uri()]
     sight.context.close()
 
@@ -294,20 +240,6 @@ def test_work_of_a_frame_is_bounded(classic: Sight) -> None:
     assert classic.settle()["stats"]["points"] == 0
 
 
-def drawn(sight: Sight) -> dict[str, Any]:
-    """Return the state after a path was drawn by hand, paused."""
-    sight.page.click("input[value=draw] + span")
-    mouse = sight.page.mouse
-    corners = ([0.015, -0.08], [-0.015, -0.08], [-0.01, -0.06], [0.01, -0.06], [0.015, -0.078])
-    mouse.move(*sight.pixel(corners[0]))
-    mouse.down()
-    for corner in corners[1:]:
-        mouse.move(*sight.pixel(corner), steps=8)
-    mouse.up()
-    sight.page.click("#play")
-    return sight.settle()
-
-
 def test_path_is_drawn_played_and_given_as_scenario_and_header(
     classic: Sight, tmp_path: Path
 ) -> None:
@@ -336,59 +268,6 @@ def test_path_is_drawn_played_and_given_as_scenario_and_header(
     compiled(tmp_path, points)
 
 
-def compiled(folder: Path, points: np.ndarray) -> None:
-    """Check that the firmware takes the header: its forward puts the foot on the path."""
-    compiler = shutil.which("cc")
-    if compiler is None:
-        return
-    (folder / "main.c").write_text(r"""
-#include <stdio.h>
-#include "page_leg.h"
-int main(void)
-{
-    int k;
-    if (fivebar_prepare(&page_leg) != FIVEBAR_OK) return 1;
-    for (k = 0; k < page_gait.rows; k++) {
-        float foot[2];
-        if (fivebar_forward(&page_leg, page_gait.theta[k], page_leg.assembly, foot)) return 2;
-        printf("%.9g %.9g\n", (double)foot[0], (double)foot[1]);
-    }
-    return 0;
-}
-""")
-    firmware = ROOT / "firmware"
-    command = [
-        compiler,
-        "-std=c99",
-        "-Wall",
-        "-Wextra",
-        "-pedantic",
-        "-Werror",
-        "-I",
-        str(firmware),
-    ]
-    sources = [str(folder / "main.c"), str(firmware / "fivebar_leg.c")]
-    program = str(folder / "main")
-    subprocess.run([*command, *sources, "-o", program], check=True)
-    run = subprocess.run([program], capture_output=True, text=True, check=True)
-    feet = np.array([line.split() for line in run.stdout.splitlines()], dtype=float)
-    np.testing.assert_allclose(feet, points[:-1], rtol=0, atol=1e-6)
-
-
-@pytest.mark.parametrize("name", ["extended", "airhockey"])
-def test_scenario_of_a_leg_without_a_path_can_be_run(
-    browser: Browser, places: dict[str, Path], name: str, tmp_path: Path
-) -> None:
-    sight = Sight(browser, places[name])
-    sight.page.click("#copy-scenario")
-    file = tmp_path / "scenario.toml"
-    file.write_text(sight.page.input_value("#given-text"), encoding="utf-8")
-    scenario = Scenario.load(file)
-    assert scenario.leg == FiveBar.load(name)
-    rollout.plan(scenario)
-    sight.context.close()
-
-
 def test_light_and_dark(classic: Sight) -> None:
     # A copy of the picture is read: the browser complains of reading its own canvas often.
     seen = """() => {
@@ -406,3 +285,4 @@ def test_light_and_dark(classic: Sight) -> None:
     classic.page.click("#theme")
     classic.settle()
     assert classic.page.evaluate(seen) == light
+    classic.page.emulate_media(color_scheme="light")

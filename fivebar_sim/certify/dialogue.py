@@ -56,6 +56,7 @@ class _Pipes:
         self.to_write = memoryview(questions)
         self.out = bytearray()
         self.err = bytearray()
+
         self.most = LONGEST_ANSWER * (questions.count(b"\n") + 1)
         self.selector = selectors.DefaultSelector()
         for pipe, event in (

@@ -118,6 +118,7 @@ def _vectors(case: Case, expected: np.ndarray) -> Iterator[tuple[str, np.ndarray
         return
     yield "wrong sign", -expected
     yield "millimetres", 1000.0 * expected
+
     if case.kind == "jacobian":
         yield "transposed", expected[[0, 2, 1, 3]]
         yield "A and E exchanged", expected[[1, 0, 3, 2]]
