@@ -22,7 +22,7 @@ LEVELS = (
     "metrics motion",
     "control",
     "scenario fivebar_controllers",
-    "robots",
+    "robots setpoints",
     "model",
     "render simulation",
     "recording tasks",
