@@ -15,6 +15,7 @@ import msgspec
 import numpy as np
 from numpy.typing import ArrayLike
 
+from fivebar_sim.arrays import Array
 from fivebar_sim.errors import ArgumentError, ConfigError
 from fivebar_sim.paths.base import TIME_ROUNDING, FootPath, Sample, check_number
 from fivebar_sim.paths.spline import Spline
@@ -71,6 +72,11 @@ class Csv(FootPath, frozen=True, tag="csv", dict=True):
     def span(self) -> float:
         """The sampled span [s], or inf if the path is periodic."""
         return self._curve.span if self._curve.period is None else math.inf
+
+    @property
+    def knots(self) -> Array:
+        """Times of the points, of the first one once more where a period ends [s], (n,)."""
+        return self._curve.spline.knots
 
     def nominal(self, time: ArrayLike) -> Sample:
         """Return the spline and its own derivatives; see `FootPath.nominal`.

@@ -1,0 +1,1 @@
+"""Certificates: bounds of reach, singularity and condition between the samples, not by sampling."""
