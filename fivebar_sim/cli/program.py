@@ -24,6 +24,7 @@ COMMANDS = {
     "check": "Check scenarios against limits, guards and recorded baselines.",
     "converge": "Show which metrics a scenario's timestep already gets right.",
     "sweep": "Simulate a scenario for all values of some of its keys.",
+    "design": "Search which leg should be built for a task, and certify the best.",
     "replay": "Open the recordings of runs in the Rerun viewer, on this machine.",
     "report": "Explain a run, or compare several, on one self-contained HTML page.",
     "render": "Draw a run: leg, target path, the foot's trail, the ground's force.",

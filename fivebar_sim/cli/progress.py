@@ -46,13 +46,13 @@ class Progress:
     ) -> None:
         self._bar.stop()
 
-    def tell(self, done: int, total: int) -> None:
-        """Show how far the command is; the first call says what was done before."""
+    def tell(self, done: int, total: int, more: str = "") -> None:
+        """Show how far the command is, and more of it; the first call says what was before."""
         self._latest = (time.monotonic(), done)
         if self._begun is None:
             self._begun = self._latest
         rate = f"{self.rate:,.3g} a second" if self.rate else ""
-        self._bar.update(self._task, completed=done, total=total, rate=rate, visible=True)
+        self._bar.update(self._task, completed=done, total=total, rate=rate + more, visible=True)
 
     @property
     def rate(self) -> float:

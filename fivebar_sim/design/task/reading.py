@@ -93,7 +93,8 @@ def _tables(table: Table, key: str, where: str) -> Table:
 
 def _variation(table: Table, leg: FiveBar, where: str) -> Variation:
     """Return what varies."""
-    known = [f"leg.{key}" for key in (*numbers(leg), "mode")] + ["gear", "servo"]
+    own = [key for key in numbers(leg) if not key.startswith("mode.")]
+    known = [f"leg.{key}" for key in (*own, "mode")] + ["gear", "servo"]
     for top in ("motion", "region"):
         for name, each in _tables(table, top, where).items():
             known += [f"{top}.{name}.{key}" for key in _keys(each)]
@@ -108,7 +109,9 @@ def _keys(table: Mapping[str, Any]) -> list[str]:
     """Return the dotted keys of all numbers in a table, with the index of those in arrays."""
     found = []
     for key, value in tables.flat(table):
-        found.append(key)
+        # Another kind would have other keys.
+        if key != "kind" and not key.endswith(".kind"):
+            found.append(key)
         if isinstance(value, list):
             found += [f"{key}.{k}" for k, each in enumerate(value) if is_finite(each)]
     return found

@@ -110,8 +110,7 @@ class Task:
 
     def preset(self, row: Array) -> str:
         """Return the leg of a design as a TOML preset, which `fivebar run` accepts as leg."""
-        table = leg_table(self.leg_of(row))
-        return tomli_w.dumps({"name": self.name, **{k: v for k, v in table.items() if k != "name"}})
+        return tomli_w.dumps(self._named(leg_table(self.leg_of(row))))
 
     def motions_of(self, row: Array) -> tuple[FootMotion, ...]:
         """Return the foot motions of a design."""
@@ -167,7 +166,7 @@ class Task:
         return np.ascontiguousarray(found[..., 0]), np.ascontiguousarray(found[..., 1])
 
     def _leg_table(self, row: Array) -> dict[str, Any]:
-        table = leg_table(self.leg)
+        table = self._named(leg_table(self.leg))
         if not self.rotor:
             geared = self.geared(row).armature
             table["armature"] = self.leg.armature if geared is None else geared
@@ -175,6 +174,10 @@ class Task:
             if key.startswith("leg."):
                 put(table, key.removeprefix("leg."), value)
         return table
+
+    def _named(self, table: dict[str, Any]) -> dict[str, Any]:
+        """Return the table of a leg with the task's name first."""
+        return {"name": "", **table} | {"name": self.name}
 
     def _motion(self, motion: FootMotion, settings: Mapping[str, Any]) -> FootMotion:
         """Return a motion with the settings of a design."""

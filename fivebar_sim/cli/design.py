@@ -1,0 +1,134 @@
+"""`fivebar design`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from tyro.conf import Positional, arg
+
+from fivebar_sim.cli.common import screen, spinner
+from fivebar_sim.cli.progress import Progress
+from fivebar_sim.cli.terminal import FAILED, say
+from fivebar_sim.errors import ArgumentError
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from fivebar_sim.design import Task
+    from fivebar_sim.design.certificate.best import Chosen
+    from fivebar_sim.design.search.run import Progress as Searched
+
+
+def design(
+    task: Positional[Annotated[str, arg(metavar="TASK")]],
+    /,
+    *,
+    out: Annotated[Path, arg(metavar="DIR")],
+    threads: int = 0,
+    quiet: bool = False,
+) -> int:
+    """Search which leg should be built for a task, and certify the best.
+
+    DIR/designs.parquet gets every evaluated design, DIR/front.parquet those that no other one
+    beats, DIR/best/*.toml the best of them as legs for `fivebar run`, certified to keep to the
+    constraints between the samples too. Broken off, the same command goes on where it was. Exit
+    status 1 if no design of the front could be certified.
+
+    Args:
+        task: Name of a shipped task, or path of a TOML file.
+        out: The directory of the search.
+        threads: How many threads evaluate; 0 is one for every processor.
+        quiet: Print nothing but errors.
+    """
+    from fivebar_sim import design as room
+    from fivebar_sim.design.certificate import best
+    from fivebar_sim.design.search.run import search
+    from fivebar_sim.workers.processes import processors
+
+    if threads < 0:
+        raise ArgumentError(f"--threads must be 0 or more, got {threads}")
+    loaded = room.load(task)
+    with _kept(out), Progress("designs", quiet=quiet) as progress:
+
+        def watch(searched: Searched) -> None:
+            front = 0 if searched.front is None else len(searched.front.rows)
+            progress.tell(searched.designs, searched.total, f", {front} on the front")
+
+        searched = search(loaded, out, threads=threads or processors(), watch=watch)
+
+    assert searched.front is not None
+    with spinner("certifying the best", quiet=quiet):
+        chosen = best.choose(loaded, searched.front)
+        files = best.write(loaded, chosen, out)
+    if not quiet:
+        _print(loaded, searched, chosen, files, screen())
+    return 0 if chosen.best or not loaded.search.best else FAILED
+
+
+def _print(
+    task: Task, searched: Searched, chosen: Chosen, files: list[Path], console: Console
+) -> None:
+    """Print what came out of a search."""
+    from rich.text import Text
+
+    assert searched.front is not None
+    front = f"{len(searched.front.rows)} on the front"
+    if searched.designs:
+        rate = f"; {searched.rate:,.3g} a minute" if searched.fresh else ""
+        text = f"{searched.designs:,} designs, {searched.feasible:,} feasible, {front}{rate}"
+        console.print(Text(f"{task.name}: {text}"), soft_wrap=True)
+        lost = [f"{name} {count:,}" for name, count in searched.excluded.most_common()]
+        if lost:
+            console.print(Text(f"excluded by {', '.join(lost)}"), soft_wrap=True)
+    else:
+        console.print(Text(f"{task.name}: finished before, {front}"), soft_wrap=True)
+
+    if chosen.best:
+        console.print(_table(task, chosen))
+    if chosen.unknown:
+        console.print(Text(f"not certified: {chosen.unknown}"), soft_wrap=True)
+    if chosen.refused:
+        count = f"{len(chosen.refused)} of {len(chosen.refused) + len(chosen.best)} tried"
+        console.print(Text(f"refused: {count}, as {chosen.refused[0]}"), soft_wrap=True)
+    if files:
+        console.print(Text(f"written to {files[0].parent}"), soft_wrap=True)
+
+
+def _table(task: Task, chosen: Chosen):
+    """Return the table of the best designs, with what is certain of them at worst."""
+    from rich import box
+    from rich.table import Table
+
+    from fivebar_sim.design.certificate.best import shown
+    from fivebar_sim.design.evaluation.objectives import CATALOGUE
+
+    table = Table(box=box.SIMPLE_HEAD)
+    for name in ("best", *task.objectives, "reach", "sine", "condition"):
+        table.add_column(name, justify="right", no_wrap=True)
+    for k, each in enumerate(chosen.best):
+        cells = [
+            shown(value, CATALOGUE[name].unit)
+            for name, value in zip(task.objectives, each.objectives.tolist(), strict=True)
+        ]
+        sure = ["", "", ""]
+        if each.certified:
+            sure = [
+                ">= " + shown(min(c.reach for c in each.certified), "m", 3),
+                f">= {min(c.singular for c in each.certified):.3f}",
+                f"<= {max(c.condition for c in each.certified):.4g}",
+            ]
+        table.add_row(str(k + 1), *cells, *sure)
+    return table
+
+
+@contextmanager
+def _kept(out: Path) -> Iterator[None]:
+    """Say where a search goes on that is broken off within."""
+    try:
+        yield
+    except KeyboardInterrupt:
+        say(f"what is found is kept in {out}; the same command goes on from there")
+        raise
