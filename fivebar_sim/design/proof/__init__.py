@@ -1,0 +1,1 @@
+"""Designs proven by simulation: the best of a search run in MuJoCo, on the same motions."""

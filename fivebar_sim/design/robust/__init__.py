@@ -1,0 +1,1 @@
+"""What becomes of a design that is built: dimensions that are a little off."""
