@@ -126,6 +126,8 @@ def test_yield_falls_where_a_limit_is_near(task: Task) -> None:
     assert tolerance_yield(tight, row, 1e-5, drawn=512, seed=1).share != found.share
 
 
+# SALib imports pandas: seconds.
+@pytest.mark.long
 @pytest.mark.skipif(find_spec("SALib") is None, reason="SALib is not installed")
 def test_sensitivities_are_those_of_a_formula(task: Task) -> None:
     """Four links of one section: each causes a quarter of the mass's scatter, L5 and tilt none."""
