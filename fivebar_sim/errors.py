@@ -57,6 +57,10 @@ class WorkersError(FiveBarError, RuntimeError):
     """Workers that are not there, or are gone; what they have done so far is kept."""
 
 
+class OptionError(ArgumentError, ConfigError):
+    """An option of an environment whose table or file has an illegal value."""
+
+
 class DivergedError(FiveBarError, RuntimeError):
     """A simulation that broke down.
 

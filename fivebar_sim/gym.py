@@ -5,17 +5,22 @@ Only this module and `vector` need Gymnasium: install the extra `rl`.
 
 from __future__ import annotations
 
-from typing import Any
+import copy
+from collections.abc import Mapping
+from typing import Any, NamedTuple
 
 import gymnasium
+import mujoco
 import numpy as np
+from gymnasium.envs.registration import EnvSpec
 from gymnasium.spaces import Box, Space
 
 from fivebar_sim import tasks
 from fivebar_sim.arrays import Array
 from fivebar_sim.errors import ArgumentError, unknown
-from fivebar_sim.render.leg_picture import LegPicture
-from fivebar_sim.tasks import REASONS, Randomise, Task
+from fivebar_sim.geometry import FiveBar
+from fivebar_sim.render.leg_picture import HEIGHT, LARGEST, WIDTH, Camera, LegPicture
+from fivebar_sim.tasks import REASONS, Randomise, Task, options
 from fivebar_sim.tasks.episodes import Episodes, Outcome
 from fivebar_sim.tasks.legs import LegGroup
 
@@ -40,46 +45,156 @@ def layout(task: Task) -> dict[str, slice]:
     return found
 
 
+def plain_spec(spec: EnvSpec | None, task: Task) -> EnvSpec | None:
+    """Return the spec of an environment as JSON can hold it, with the length of its episodes.
+
+    Options that are objects become tables, from which `gymnasium.make` makes the same ones.
+    """
+    if spec is None:
+        return None
+    kept = copy.copy(spec)
+    kept.kwargs = {name: options.plain(value) for name, value in spec.kwargs.items()}
+    kept.max_episode_steps = task.periods
+    return kept
+
+
+def check_reset_options(given: Any, known: tuple[str, ...] = ()) -> dict[str, Any]:
+    """Return the options of a reset.
+
+    Raises:
+        ArgumentError: Not a table, or one with an unknown key.
+    """
+    if given is not None and not isinstance(given, Mapping):
+        raise ArgumentError(f"options of reset must be None or a table, got {given!r}")
+    for name in given or {}:
+        if name not in known:
+            legal = unknown("option of reset", str(name), known)
+            raise ArgumentError(legal if known else f"reset has no options, got {name!r}")
+    return dict(given or {})
+
+
+class Pictures(NamedTuple):
+    """What the pictures of an environment look like.
+
+    Attributes:
+        camera: Where the camera stands.
+        width, height: Size of a leg's picture [pixels].
+    """
+
+    camera: Camera
+    width: int
+    height: int
+
+    @classmethod
+    def of(cls, camera: Any, width: Any, height: Any) -> Pictures:
+        """Return them, checked.
+
+        Raises:
+            ArgumentError: A value of the wrong type or out of range.
+        """
+        for name, side in (("width", width), ("height", height)):
+            if options.check_whole(name, side, 1) > LARGEST:
+                raise ArgumentError(f"{name} must be in [1, {LARGEST}] pixels, got {side!r}")
+        placed = options.as_struct("camera", {} if camera is None else camera, Camera)
+        return cls(placed, int(width), int(height))
+
+    def of_leg(self, model: mujoco.MjModel, leg: FiveBar) -> LegPicture:
+        """Return what takes them of a leg."""
+        return LegPicture(model, leg, self.camera, width=self.width, height=self.height)
+
+
+def check_render_mode(render_mode: Any, known: tuple[str, ...]) -> None:
+    """Raise unless a render mode is one of those known, or None.
+
+    Raises:
+        ArgumentError: It is not.
+    """
+    if render_mode is not None and render_mode not in known:
+        raise ArgumentError(unknown("render_mode", str(render_mode), known))
+
+
 class LegEnv(gymnasium.Env[Array, Array]):
     """One leg with one task.
 
     Observations are the task's `parts` one after the other (`layout` says where), actions its
     `actions` within their bounds, both in SI units and radians; nothing but rounding is clipped.
     `gymnasium.wrappers.RescaleAction` makes actions of [-1, 1]. info has the reward's "terms" by
-    name and the "reason" why the episode ended, "" before its end.
+    name and the "reason" why the episode ended, "" before its end. A copy, also a pickled one, goes
+    on with the same bits.
 
     Args:
         task: "track", "stand", "hop", "gait", or a Task.
         render_mode: "rgb_array" or None.
-        randomise: Ranges of the leg's random parameters; None: no randomisation.
+        randomise: Ranges of the leg's random parameters, or a table of them; None: no
+            randomisation.
         model_seed: Seed of the random parameters.
-        options: The task's keywords: leg, servo, action, period ...
+        width: Width of a picture [pixels].
+        height: Height of a picture [pixels].
+        camera: Where the camera stands: a `Camera`, or a table of azimuth, elevation [deg],
+            distance and lookat [m]; None for its defaults.
+        task_options: The task's keywords: leg, servo, action, period ...; leg, servo, path and
+            sensors also as tables with the keys of scenarios.
 
     Raises:
-        ArgumentError: Unknown task, option or render mode.
+        ArgumentError: Unknown task, option or render mode, or a value of the wrong type.
     """
 
     metadata = {"render_modes": list(RENDER_MODES), "render_fps": 50}  # noqa: RUF012 - as in Env
 
     def __init__(
         self,
-        task: str | Task,
+        task: str | Task | Mapping[str, Any],
         render_mode: str | None = None,
-        randomise: Randomise | None = None,
+        randomise: Randomise | Mapping[str, Any] | None = None,
         model_seed: int = 0,
-        **options: Any,
+        width: int = WIDTH,
+        height: int = HEIGHT,
+        camera: Camera | Mapping[str, Any] | None = None,
+        **task_options: Any,
     ) -> None:
-        if render_mode is not None and render_mode not in RENDER_MODES:
-            raise ArgumentError(unknown("render_mode", str(render_mode), RENDER_MODES))
-        self._group = LegGroup(tasks.task(task, **options), [model_seed], randomise)
+        check_render_mode(render_mode, RENDER_MODES)
+        self._pictures = Pictures.of(camera, width, height)
+        ranges = tasks.ranges(randomise)
+        seed = options.check_whole("model_seed", model_seed, 0)
+        self._group = LegGroup(tasks.task(task, **task_options), [seed], ranges)
         self.render_mode = render_mode
         # Made by the first `render`: training without pictures needs no GL.
-        self._picture = None
+        self._picture: LegPicture | None = None
+        self._data: mujoco.MjData | None = None
+        self._spec: EnvSpec | None = None
         self.task = self._group.task
         self.episodes = self._group.episodes
         self.observation_space, self.action_space = spaces(self.episodes)
         self.layout = layout(self.task)
         self.metadata = {**self.metadata, "render_fps": 1.0 / self.task.period}
+
+    def __getstate__(self) -> dict[str, Any]:
+        # GL contexts cannot be copied, and MjData is made from the state again.
+        return {**self.__dict__, "_picture": None, "_data": None}
+
+    @property
+    def spec(self) -> EnvSpec | None:
+        """How `gymnasium.make` makes this environment; None unless it did."""
+        return self._spec
+
+    @spec.setter
+    def spec(  # pyright: ignore[reportIncompatibleVariableOverride]
+        self, value: EnvSpec | None
+    ) -> None:
+        self._spec = plain_spec(value, self.task)
+
+    @property
+    def model(self) -> mujoco.MjModel:
+        """The leg's MuJoCo model; the leg itself is stepped with a copy."""
+        return self._group.models[0]
+
+    @property
+    def data(self) -> mujoco.MjData:
+        """The leg's state, with all that follows from it; writing into it changes nothing."""
+        if self._data is None:
+            self._data = mujoco.MjData(self.model)
+        self._group.write(0, self._data)
+        return self._data
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -88,11 +203,13 @@ class LegEnv(gymnasium.Env[Array, Array]):
 
         Args:
             seed: Seed of this and the following episodes; None: continue with the last one.
-            options: Unused.
+            options: None or {}: a reset has no options.
 
         Raises:
             gymnasium.error.Error: The seed is not a whole number >= 0.
+            ArgumentError: An option.
         """
+        check_reset_options(options)
         super().reset(seed=seed)
         return _row(self._group.reset([self.np_random]))[0], {}
 
@@ -109,7 +226,7 @@ class LegEnv(gymnasium.Env[Array, Array]):
         return observation, float(outcome.reward[0]), *over, info
 
     def render(self) -> Any:
-        """Return a picture of the leg, (480, 640, 3); None without a render mode.
+        """Return a picture of the leg, (height, width, 3); None without a render mode.
 
         Raises:
             ConfigError: There is no working GL.
@@ -117,7 +234,7 @@ class LegEnv(gymnasium.Env[Array, Array]):
         if self.render_mode is None:
             return None
         if self._picture is None:
-            self._picture = LegPicture(self._group.model, self.task.leg)
+            self._picture = self._pictures.of_leg(self.model, self.task.leg)
         return self._picture.take(self.episodes.qpos[0])
 
     def close(self) -> None:

@@ -18,7 +18,7 @@ import fivebar_sim.gym
 from fivebar_sim import Scenario, kinematics, motion, run
 from fivebar_sim.control.sensors import Sensors
 from fivebar_sim.control.servo import Servo
-from fivebar_sim.errors import ArgumentError, ConfigError
+from fivebar_sim.errors import ArgumentError
 from fivebar_sim.files import resources
 from fivebar_sim.geometry import FiveBar
 from fivebar_sim.gym import LegEnv
@@ -270,24 +270,6 @@ def test_registered_twice_is_once() -> None:
     assert len(gymnasium.registry) == before
 
 
-def test_picture_shows_the_leg() -> None:
-    env = LegEnv("stand", render_mode="rgb_array")
-    env.reset(seed=0)
-    try:
-        first = env.render()
-    except ConfigError as error:
-        pytest.skip(str(error))
-    for _ in range(40):
-        env.step(env.episodes.low)
-    second = env.render()
-    env.close()
-    env.close()
-    assert first.shape == (480, 640, 3)
-    assert first.std() > 5.0
-    assert (first != second).any()
-    assert LegEnv("stand").render() is None
-
-
 # refusal
 
 
@@ -318,6 +300,13 @@ def test_refusal_of_a_step_before_reset() -> None:
 def test_refusal_of_a_seed(seed: Any) -> None:
     with pytest.raises(gymnasium.error.Error, match="must be"):
         LegEnv("track").reset(seed=seed)
+
+
+def test_refusal_of_reset_options() -> None:
+    env = LegEnv("track")
+    env.reset(options={})
+    with pytest.raises(ArgumentError, match=r"^reset has no options, got 'spread'"):
+        env.reset(options={"spread": 0.0})
 
 
 def test_refusal_of_what_is_unknown() -> None:

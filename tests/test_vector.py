@@ -13,7 +13,7 @@ from gymnasium.vector import AutoresetMode
 
 import fivebar_sim.gym
 from fivebar_sim.control.sensors import Sensors
-from fivebar_sim.errors import ArgumentError
+from fivebar_sim.errors import ArgumentError, ConfigError
 from fivebar_sim.gym import LegEnv
 from fivebar_sim.tasks import KINDS, Hop, Randomise
 from fivebar_sim.vector import LegVectorEnv
@@ -131,6 +131,90 @@ def test_seeds_are_each_legs() -> None:
     assert not np.array_equal(legs.reset()[0], mixed)
 
 
+@pytest.mark.parametrize("mode", ["NextStep", "SameStep", "Disabled"])
+def test_masked_reset_leaves_the_others_be(mode: str) -> None:
+    """Each leg is as alone, with noise, at whatever step the others are reset."""
+    options: dict[str, Any] = {"sensors": Sensors(noise=0.01), "duration": 0.5}
+    legs = LegVectorEnv("hop", LEGS, nthread=1, autoreset_mode=mode, **options)
+    alone = [LegEnv("hop", **options) for _ in range(LEGS)]
+    seen = legs.reset(seed=7)[0]
+    for i, env in enumerate(alone):
+        env.reset(seed=7 + i)
+    random = np.random.default_rng(1)
+    for k in range(20):
+        mask = random.random(LEGS) < 0.4
+        if k % 3 == 0 and mask.any():
+            seeds = None if k % 2 else [100 * k + i for i in range(LEGS)]
+            again = legs.reset(seed=seeds, options={"reset_mask": mask})[0]
+            for i in np.flatnonzero(mask).tolist():
+                first = alone[i].reset(seed=seeds[i] if seeds else None)[0]
+                np.testing.assert_array_equal(again[i], first)
+            np.testing.assert_array_equal(again[~mask], seen[~mask])
+        chosen = random.uniform(legs.episodes.low, legs.episodes.high, (LEGS, 2))
+        seen = legs.step(chosen)[0]
+        expected = [env.step(action)[0] for env, action in zip(alone, chosen, strict=True)]
+        np.testing.assert_array_equal(seen, expected)
+
+
+def test_same_step_autoreset_is_gymnasiums() -> None:
+    """Against Gymnasium's own vector environment of single ones: every number, at every end."""
+    options: dict[str, Any] = {"sensors": Sensors(noise=0.01), "duration": 0.05, "span": 2.0}
+    legs = LegVectorEnv("hop", 3, nthread=1, autoreset_mode="SameStep", **options)
+    theirs = gymnasium.vector.SyncVectorEnv(
+        [lambda: LegEnv("hop", **options)] * 3, autoreset_mode=AutoresetMode.SAME_STEP
+    )
+    np.testing.assert_array_equal(legs.reset(seed=2)[0], theirs.reset(seed=2)[0])
+    random = np.random.default_rng(0)
+    ends = 0
+    for _ in range(35):
+        chosen = random.uniform(legs.episodes.low, legs.episodes.high, (3, 2))
+        *ours, info = legs.step(chosen)
+        *expected, more = theirs.step(chosen)
+        for mine, other in zip(ours, expected, strict=True):
+            np.testing.assert_array_equal(mine, other)
+        assert ("final_obs" in info) == ("final_obs" in more)
+        for i in np.flatnonzero(info.get("_final_obs", np.zeros(3))).tolist():
+            np.testing.assert_array_equal(info["final_obs"][i], more["final_obs"][i])
+            assert info["final_info"]["reason"][i] == more["final_info"]["reason"][i] != ""
+            ends += 1
+    assert ends > 9
+
+
+def test_disabled_autoreset_waits_for_a_reset() -> None:
+    legs = LegVectorEnv("track", 2, nthread=1, autoreset_mode="Disabled", duration=0.01)
+    legs.reset(seed=0)
+    legs.reset(options={"reset_mask": np.array([False, True])})
+    middle = np.tile(0.5 * (legs.episodes.low + legs.episodes.high), (2, 1))
+    legs.step(middle)
+    assert legs.step(middle)[3].all()
+    with pytest.raises(ArgumentError, match=r"^the episodes of legs \[0, 1\] are over: reset them"):
+        legs.step(middle)
+    legs.reset(options={"reset_mask": np.array([True, False])})
+    with pytest.raises(ArgumentError, match=r"^the episodes of legs \[1\] are over"):
+        legs.step(middle)
+
+
+def test_picture_of_all_legs_has_each_in_its_place() -> None:
+    legs = LegVectorEnv("track", 3, nthread=1, render_mode="rgb_array", width=60, height=40)
+    each = LegVectorEnv("track", 3, nthread=1, render_mode="rgb_array_list", width=60, height=40)
+    legs.reset(seed=0)
+    each.reset(seed=0)
+    try:
+        whole = legs.render()
+    except ConfigError as error:
+        pytest.skip(str(error))
+    parts = each.render()
+    assert whole.shape == (80, 120, 3)
+    places = (np.s_[:40, :60], np.s_[:40, 60:], np.s_[40:, :60])
+    for place, part in zip(places, parts, strict=True):
+        np.testing.assert_array_equal(whole[place], part)
+        assert part.std() > 5.0
+    assert not whole[40:, 60:].any()
+    legs.close()
+    each.close()
+    assert LegVectorEnv("track", 2, nthread=1).render() is None
+
+
 def test_what_came_before_stays_as_it_was() -> None:
     legs = LegVectorEnv("track", 2)
     first = legs.reset(seed=0)[0]
@@ -191,6 +275,23 @@ def test_refusal_of_a_seed(seed: Any) -> None:
 def test_refusal_of_a_number_of_legs(number: Any) -> None:
     with pytest.raises(ArgumentError, match=r"^num_envs must be in \[1, inf\), got"):
         LegVectorEnv("track", number)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"mask": 1}, r"unknown option of reset 'mask'; known: reset_mask$"),
+        ({"reset_mask": [True, False]}, r"reset_mask must be an array of 2 bools, one True at"),
+        ({"reset_mask": np.ones(2)}, r"reset_mask must be an array of 2 bools"),
+        ({"reset_mask": np.ones(3, bool)}, r"reset_mask must be an array of 2 bools"),
+        ({"reset_mask": np.zeros(2, bool)}, r"reset_mask must be an array of 2 bools"),
+        ({"reset_mask": np.array([True, False])}, r"reset_mask leaves legs out that were never"),
+        ("reset_mask", r"options of reset must be None or a table, got 'reset_mask'"),
+    ],
+)
+def test_refusal_of_reset_options(options: Any, message: str) -> None:
+    with pytest.raises(ArgumentError, match=f"^{message}"):
+        LegVectorEnv("track", 2, nthread=1).reset(options=options)
 
 
 def test_refusal_of_too_few_seeds() -> None:

@@ -36,12 +36,21 @@ class Noise:
         # As if used up, so that the next draw takes them from the new generator.
         self._used[rows] = DRAWN
 
-    def draw(self) -> Array:
-        """Return the next numbers of each leg, (nsim, 2, 2): angles of A and E, then rates."""
-        for row in np.flatnonzero(self._used == DRAWN).tolist():
+    def draw(self, rows: NDArray[np.int64] | None = None) -> Array:
+        """Return the next numbers of each leg, (nsim, 2, 2): angles of A and E, then rates.
+
+        Args:
+            rows: Only these legs draw, and the others' numbers are 0; None: all of them.
+        """
+        legs = self._legs if rows is None else rows
+        for row in legs[self._used[legs] == DRAWN].tolist():
             self._drawn[row] = self._random[row].standard_normal((DRAWN, 2, 2))
             self._used[row] = 0
 
-        drawn = self._drawn[self._legs, self._used]
-        self._used += 1
-        return drawn
+        drawn = self._drawn[legs, self._used[legs]]
+        self._used[legs] += 1
+        if rows is None:
+            return drawn
+        every = np.zeros((len(self._legs), 2, 2))
+        every[rows] = drawn
+        return every

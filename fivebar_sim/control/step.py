@@ -119,14 +119,20 @@ class ControlStep:
         self._theta = _last(self._theta, theta)
         self._theta_dot = _last(self._theta_dot, theta_dot)
 
-    def observe(self, k: Steps) -> Observation:
-        """Return what the sensors show at step k; the time is (nsim,) if k is."""
+    def observe(self, k: Steps, rows: NDArray[np.int64] | None = None) -> Observation:
+        """Return what the sensors show at step k; the time is (nsim,) if k is.
+
+        Args:
+            k: The step.
+            rows: Only the sensors of these legs are read; the others' noise goes on where it was.
+                None: those of all legs.
+        """
         sensors = self._sensors
         time = cast(float, k * self._h)
         theta = self._seen(self._theta)
         theta_dot = self._seen(self._theta_dot)
         if self._noise is not None:
-            drawn = self._noise.draw()
+            drawn = self._noise.draw(rows)
             theta = theta + sensors.noise * drawn[:, 0]
             theta_dot = theta_dot + sensors.rate_noise * drawn[:, 1]
         # After the noise: an encoder counts the angle that it sees, noise included.

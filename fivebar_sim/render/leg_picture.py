@@ -2,24 +2,56 @@
 
 from __future__ import annotations
 
+import copy
 import weakref
 
+import msgspec
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
 from fivebar_sim.arrays import Array
-from fivebar_sim.errors import ConfigError
+from fivebar_sim.checks import check_number
+from fivebar_sim.errors import ArgumentError, ConfigError
 from fivebar_sim.geometry import FiveBar
 from fivebar_sim.render import gl
 
 WIDTH = 640
 HEIGHT = 480
+LARGEST = 8192
+"""Most pixels along a side."""
 GEOMS = 200
 """Most geoms of a scene."""
 FAR = 3.5
-DOWN = -9.0
-"""Position of the camera: distance in leg sizes, and elevation [degrees]."""
+"""Distance of the camera in leg sizes."""
+
+
+class Camera(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """Where the camera of a leg's pictures stands, as in MuJoCo's free camera.
+
+    Attributes:
+        azimuth: Its direction about the vertical [deg]; 90 looks along the hip's axis.
+        elevation: How far it looks up [deg].
+        distance: From the point that it looks at [m]; None for 3.5 times the leg's size.
+        lookat: That point (x, y, z) [m]; None for one below the hip, which it then follows.
+    """
+
+    azimuth: float = 90.0
+    elevation: float = -9.0
+    distance: float | None = None
+    lookat: tuple[float, float, float] | None = None
+
+    def __post_init__(self) -> None:
+        check_number("camera.azimuth", self.azimuth, "deg", low=-360.0, high=360.0)
+        check_number("camera.elevation", self.elevation, "deg", low=-90.0, high=90.0)
+        if self.distance is not None:
+            check_number("camera.distance", self.distance, "m", low=0.0, strict=True)
+        if self.lookat is None:
+            return
+        if not isinstance(self.lookat, (tuple, list)) or len(self.lookat) != 3:
+            raise ArgumentError(f"camera.lookat must be (x, y, z) in m, got {self.lookat!r}")
+        for k, part in enumerate(self.lookat):
+            check_number(f"camera.lookat[{k}]", part, "m")
 
 
 class LegPicture:
@@ -28,24 +60,40 @@ class LegPicture:
     Args:
         model: The leg's model.
         leg: The leg.
+        camera: Where the camera stands.
+        width: Width of the pictures [pixels].
+        height: Height of the pictures [pixels].
 
     Raises:
         ConfigError: There is no working GL.
     """
 
-    def __init__(self, model: mujoco.MjModel, leg: FiveBar) -> None:
+    def __init__(
+        self,
+        model: mujoco.MjModel,
+        leg: FiveBar,
+        camera: Camera = Camera(),  # noqa: B008 - it is frozen
+        *,
+        width: int = WIDTH,
+        height: int = HEIGHT,
+    ) -> None:
+        # A copy, whose buffer for pictures is as large as they are.
+        model = copy.copy(model)
+        model.vis.global_.offwidth = width
+        model.vis.global_.offheight = height
         self._model = model
         self._data = mujoco.MjData(model)
         self._size = leg.size
-        self._rect = mujoco.MjrRect(0, 0, WIDTH, HEIGHT)
+        self._lookat = camera.lookat
+        self._rect = mujoco.MjrRect(0, 0, width, height)
         self._scene = mujoco.MjvScene(model, GEOMS)
         self._option = mujoco.MjvOption()
         self._camera = mujoco.MjvCamera()
         self._camera.type = mujoco.mjtCamera.mjCAMERA_FREE
-        self._camera.azimuth = 90.0
-        self._camera.elevation = DOWN
-        self._camera.distance = FAR * leg.size
-        self._gl = gl.context(gl.find(), WIDTH, HEIGHT)
+        self._camera.azimuth = camera.azimuth
+        self._camera.elevation = camera.elevation
+        self._camera.distance = camera.distance or FAR * leg.size
+        self._gl = gl.context(gl.find(), width, height)
         # A finalizer runs before Python unloads its modules; `__del__` may come too late for GL.
         self._free = weakref.finalize(self, self._gl.free)
 
@@ -54,25 +102,26 @@ class LegPicture:
             self._mjr = mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_100)
         except mujoco.FatalError as error:
             self._free()
-            raise ConfigError(f"cannot draw {WIDTH} x {HEIGHT} pixels here: {error}") from None
+            raise ConfigError(f"cannot draw {width} x {height} pixels here: {error}") from None
 
         # The default target is a window, and there is none.
         mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN, self._mjr)
 
     def take(self, qpos: Array) -> NDArray[np.uint8]:
-        """Return the picture of a pose (nq,), (HEIGHT, WIDTH, 3)."""
+        """Return the picture of a pose (nq,), (height, width, 3)."""
         self._data.qpos[:] = qpos
         # Positions are all that a picture needs; mj_forward would solve for forces too.
         mujoco.mj_kinematics(self._model, self._data)
         mujoco.mj_camlight(self._model, self._data)
-        self._camera.lookat[:] = self._data.body("hip").xpos - (0.0, 0.0, 0.4 * self._size)
+        below = self._data.body("hip").xpos - (0.0, 0.0, 0.4 * self._size)
+        self._camera.lookat[:] = below if self._lookat is None else self._lookat
         every = mujoco.mjtCatBit.mjCAT_ALL
         mujoco.mjv_updateScene(
             self._model, self._data, self._option, None, self._camera, every, self._scene
         )
         self._gl.make_current()
         mujoco.mjr_render(self._rect, self._scene, self._mjr)
-        pixels = np.empty((HEIGHT, WIDTH, 3), np.uint8)
+        pixels = np.empty((self._rect.height, self._rect.width, 3), np.uint8)
         mujoco.mjr_readPixels(pixels, None, self._rect, self._mjr)
 
         # GL counts rows from the bottom, image files from the top.

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import ClassVar, Literal, NamedTuple, Self, get_args
+from collections.abc import Mapping
+from typing import Any, ClassVar, Literal, NamedTuple, Self, get_args
 
 import msgspec
 import numpy as np
@@ -19,6 +20,7 @@ from fivebar_sim.geometry import FiveBar
 from fivebar_sim.integrator import Integrator
 from fivebar_sim.paths import FootPath
 from fivebar_sim.scenario.scenes import Ground, Scene
+from fivebar_sim.tasks import options
 from fivebar_sim.tasks.motion import Motion
 
 Action = Literal["position", "motion", "torque"]
@@ -90,12 +92,12 @@ class Task(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
     weights: dict[str, float] = {}
 
     def __post_init__(self) -> None:
-        if self.action not in ACTIONS:
-            raise ArgumentError(unknown("action", str(self.action), ACTIONS))
+        for name in options.KINDS:
+            options.check_kind(name, getattr(self, name))
+        _check_word("action", self.action, ACTIONS)
+        _check_word("integrator", self.integrator, get_args(Integrator))
         if self.action == "torque" and self.servo.limit is None:
             raise ArgumentError("action 'torque' needs a servo with a limit: its bounds [N m]")
-        if self.integrator not in get_args(Integrator):
-            raise ArgumentError(unknown("integrator", str(self.integrator), get_args(Integrator)))
 
         check_number("span", self.span, "rad", low=0.0, high=WIDEST, strict=True)
         check_number("spread", self.spread, "m", low=0.0, high=self.leg.size)
@@ -117,9 +119,16 @@ class Task(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
                 f"got {self.duration!r} s"
             )
 
+        self._check_weights()
+
+    def _check_weights(self) -> None:
+        """Raise unless the weights are numbers by the names of reward terms."""
+        if not isinstance(self.weights, Mapping):
+            known = ", ".join(self.WEIGHTS)
+            raise ArgumentError(f"weights must be a table of {known}, got {self.weights!r}")
         for name, weight in self.weights.items():
             if name not in self.WEIGHTS:
-                raise ArgumentError(unknown("reward term", name, self.WEIGHTS))
+                raise ArgumentError(unknown("reward term", str(name), self.WEIGHTS))
             check_number(f"weights.{name}", weight, "")
 
     @property
@@ -256,6 +265,12 @@ class Grounded(Task, frozen=True):
         super().__post_init__()
         # Made for its checks alone: a task allows what its scene allows.
         Ground(mass=self.mass, friction=self.friction, drop=self.drop)
+
+
+def _check_word(name: str, value: Any, known: tuple[str, ...]) -> None:
+    """Raise unless a value is one of some words."""
+    if not isinstance(value, str) or value not in known:
+        raise ArgumentError(unknown(name, str(value), known))
 
 
 def effort(now: Motion) -> Array:

@@ -183,12 +183,16 @@ class Episodes:
         self._count += 1
         self._fresh[:] = False
 
-    def outcome(self) -> Outcome:
-        """Return what agents get; legs that have just started have no reward and no end."""
+    def outcome(self, rows: NDArray[np.int64] | None = None) -> Outcome:
+        """Return what agents get; legs that have just started have no reward and no end.
+
+        Args:
+            rows: The legs that matter: the others' sensors are not read again. None: all of them.
+        """
         task = self.task
         now = motion(self._leg, self.qpos, self.qvel, self._torque, self._broken)
         targets = self._targets[np.minimum(self._count, task.periods)]
-        seen = self._control.observe(self._count * task.every)
+        seen = self._control.observe(self._count * task.every, rows)
         # A fresh leg has run no period that could be rewarded.
         ran = ~self._fresh
         terms = {name: term * ran for name, term in task.terms(now, targets).items()}

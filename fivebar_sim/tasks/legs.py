@@ -12,9 +12,9 @@ from fivebar_sim import model, motion
 from fivebar_sim.arrays import Array
 from fivebar_sim.errors import ArgumentError, UnreachableError
 from fivebar_sim.scenario.scenes import Ground
-from fivebar_sim.simulation.steps import Legs
 from fivebar_sim.tasks import Randomise, Task
 from fivebar_sim.tasks.episodes import Episodes, Outcome
+from fivebar_sim.tasks.stepped import SteppedLegs
 
 STARTS = 32
 """Start poses per leg; each episode draws one of them."""
@@ -32,8 +32,9 @@ class LegGroup:
     Attributes:
         task: The task, with its path spelt out.
         drawn: The task with each leg's own numbers, n of them.
-        model: The first leg's model, to draw it; the legs are stepped with copies.
+        models: Each leg's model; the legs are stepped with copies.
         episodes: The legs' episodes.
+        over: Whether each leg's episode is over, (n,).
 
     Raises:
         UnreachableError: A leg cannot follow the path.
@@ -47,12 +48,16 @@ class LegGroup:
         nthread: int = 1,
     ) -> None:
         self.task = task.resolved()
-        self.drawn, models, starts = prepare(self.task, seeds, randomise)
+        self.drawn, self.models, starts = prepare(self.task, seeds, randomise)
         self.episodes = Episodes(self.task, self.drawn, starts)
-        self._legs = _Legs(models, starts[:, 0], nthread, forces=False)
-        self.model = models[0]
-        self._over = np.zeros(len(seeds), dtype=bool)
+        self._legs = SteppedLegs(self.models, starts[:, 0], nthread)
+        self.over = np.zeros(len(seeds), dtype=bool)
         self._random: list[np.random.Generator] = []
+
+    @property
+    def has_begun(self) -> bool:
+        """Whether there are episodes to step through."""
+        return bool(self._random)
 
     def reset(self, random: Sequence[np.random.Generator]) -> Outcome:
         """Start a new episode of every leg and return its first outcome.
@@ -62,8 +67,18 @@ class LegGroup:
         """
         self._random = list(random)
         self._begin(np.arange(self.episodes.size))
-        self._over[:] = False
         return self.episodes.outcome()
+
+    def restart(self, rows: NDArray[np.int64], random: Sequence[np.random.Generator]) -> Outcome:
+        """Start a new episode of some legs; of the outcome only their rows count.
+
+        Args:
+            rows: Indices of those legs.
+            random: A generator for each leg of the group.
+        """
+        self._random = list(random)
+        self._begin(rows)
+        return self.episodes.outcome(rows)
 
     def step(self, action: Array) -> Outcome:
         """Return the outcome of an action; a leg whose episode was over starts a new one instead.
@@ -71,29 +86,27 @@ class LegGroup:
         Args:
             action: A checked action, (n, size).
         """
-        if not self._random:
+        if not self.has_begun:
             raise ArgumentError("step comes after reset")
+        over = np.flatnonzero(self.over)
         self.episodes.update(*self._legs.moved(self.episodes.commands(action)))
         # The action of a leg that was over is thrown away: Gymnasium's next-step autoreset.
-        if self._over.any():
-            self._begin(np.flatnonzero(self._over))
+        if over.size:
+            self._begin(over)
         outcome = self.episodes.outcome()
-        self._over = outcome.terminated | outcome.truncated
+        self.over = outcome.terminated | outcome.truncated
         return outcome
+
+    def write(self, row: int, data: mujoco.MjData) -> None:
+        """Put the state of a leg into an MjData of its model, and compute what follows from it."""
+        self._legs.write(row, data)
+        with model.without_log():
+            mujoco.mj_forward(self.models[row], data)
 
     def _begin(self, rows: NDArray[np.int64]) -> None:
         random = [self._random[row] for row in rows.tolist()]
         self._legs.restart(rows, self.episodes.begin(rows, random))
-
-
-class _Legs(Legs):
-    """Legs of which some can be started again."""
-
-    def restart(self, rows: NDArray[np.int64], qpos: Array) -> None:
-        """Put some legs at rest into poses (k, nq)."""
-        # No mj_forward: it would be of the model's default pose, which the next line replaces.
-        self._batch.reset(rows, stage=mujoco.mjtStage.mjSTAGE_NONE.value)
-        self._batch.qpos[rows] = qpos
+        self.over[rows] = False
 
 
 def prepare(
