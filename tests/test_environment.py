@@ -26,6 +26,7 @@ from fivebar_sim.tasks import KINDS, Randomise
 # isort: split
 from absl.testing import absltest
 from dm_control.rl import control
+from dm_control.suite.wrappers import action_noise, action_scale
 
 
 class Conformance(test_utils.EnvironmentTestMixin):
@@ -190,6 +191,28 @@ def test_the_viewer_would_run_it() -> None:
         run.tick(0.02, paused=False)
     assert env.physics.time() > 0.1
     assert env.physics.data.qpos[0] > 0.03
+
+
+def test_wrappers_of_the_suite_apply() -> None:
+    """They draw from `task.random`, and scale actions to the bounds exactly."""
+    env = action_noise.Wrapper(environment.load("track", seed=0), scale=0.01)
+    env = action_scale.Wrapper(env, minimum=-1.0, maximum=1.0)
+    env.reset()
+    for part in (-1.0, 1.0, 0.3):
+        step = env.step(np.full(2, part))
+    assert step.reward is not None
+
+
+def test_a_random_state_takes_the_generators_place() -> None:
+    """As Shimmy seeds the episodes of dm_control's environments."""
+    seen = []
+    for seed in (3, 3, 4):
+        env = environment.load("hop", seed=0, sensors={"noise": 0.01})
+        env.task.random = np.random.RandomState(seed)
+        seen.append([np.hstack(list(env.reset().observation.values())) for _ in range(2)])
+    np.testing.assert_array_equal(seen[0], seen[1])
+    assert not np.array_equal(seen[0], seen[2])
+    assert not np.array_equal(seen[0][0], seen[0][1])
 
 
 # refusal

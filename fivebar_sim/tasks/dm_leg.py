@@ -101,6 +101,17 @@ class LegPhysics(Physics):
         return int(self.data.ptr.warning.number.sum())
 
 
+Random = np.random.Generator | np.random.RandomState
+
+
+def _generator(random: Random) -> np.random.Generator:
+    """Return a generator that takes its numbers from the same stream."""
+    if isinstance(random, np.random.Generator):
+        return random
+    # The only way to it from a RandomState, and a public attribute of neither of them.
+    return np.random.Generator(random._bit_generator)
+
+
 class LegTask(control.Task):
     """One of our tasks behind dm_control's interface.
 
@@ -115,16 +126,30 @@ class LegTask(control.Task):
 
     outcome: Outcome
 
-    def __init__(self, episodes: Episodes, random: np.random.Generator) -> None:
+    def __init__(self, episodes: Episodes, random: Random) -> None:
         self.episodes = episodes
+        # Not private to all: Shimmy writes a RandomState here to seed the episodes.
         self._random = random
         self._names = list(episodes.task.parts)
         sizes = [part.size for part in episodes.task.parts.values()]
         self._cuts = np.cumsum(sizes)[:-1]
 
+    @property
+    def random(self) -> Random:
+        """What starts and sensor noise are drawn from, as the wrappers of dm_control's suite ask.
+
+        A `numpy.random.RandomState` may take its place, as in the suite.
+        """
+        return self._random
+
+    @random.setter
+    def random(self, value: Random) -> None:
+        self._random = value
+
     def initialize_episode(self, physics: LegPhysics) -> None:
         """Put the leg at rest near the start of its path."""
-        physics.data.qpos[:] = self.episodes.begin(np.zeros(1, dtype=np.int64), [self._random])[0]
+        one = np.zeros(1, dtype=np.int64)
+        physics.data.qpos[:] = self.episodes.begin(one, [_generator(self._random)])[0]
         self.outcome = self.episodes.outcome()
 
     def before_step(self, action: Any, physics: LegPhysics) -> None:
