@@ -174,6 +174,11 @@ def test_any_path_can_be_told(recorded: Shell) -> None:
     ElementTree.parse("x.xml")
 
 
+def test_empty_summary_is_none(recorded: Shell) -> None:
+    """What "$GITHUB_STEP_SUMMARY" is outside of GitHub."""
+    assert recorded("check", "short.toml", "--summary", "", "--quiet") == (0, "", "")
+
+
 def test_summary_is_appended(recorded: Shell) -> None:
     Path("page.md").write_text("# My job\n", encoding="utf-8")
     for _ in range(2):

@@ -9,6 +9,7 @@ import sys
 import tomllib
 from collections.abc import Callable
 from pathlib import Path
+from xml.etree import ElementTree
 
 import pytest
 from hypothesis import given
@@ -150,6 +151,72 @@ def test_runs_are_forgotten(request):
     said = counted(ended.returncode, ended.stdout, ended.stderr, passed=4)
     assert "1 xfailed" in said
     assert not (tmp_path / "fivebar-artifacts").exists()
+
+
+SHARED = """
+import pytest
+
+@pytest.fixture(scope="module")
+def slow(leg_run):
+    return leg_run("mine.toml", settings=["name=mine"])
+
+@pytest.fixture(scope="session")
+def strict(leg_run):
+    return leg_run("strict.toml", settings=["name=strict"])
+
+def test_first(slow):
+    assert slow.verdict == "not judged"
+
+def test_second(slow, strict):
+    strict.assert_limits()
+
+def test_third(slow, leg_run):
+    leg_run("mine.toml", settings=["name=own"])
+    slow.assert_metric("tracking.rms", high=1e-9)
+
+def test_fourth(leg_run):
+    assert leg_run("mine.toml", settings=["name=own"]).verdict == "fail"
+
+@pytest.mark.parametrize("k", [1, 2])
+def test_nothing(k):
+    assert k == 2
+"""
+
+
+def test_fixtures_of_any_scope_run_legs(
+    session: Session, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A failed test keeps what the shared fixtures that it uses have run, and JUnit says where."""
+    monkeypatch.setattr(look, "png", lambda figure: b"drawn")
+    said = session(SHARED, "--junit-xml=junit.xml", failed=4, passed=2)
+    kept = {
+        "second": {"mine", "strict"},
+        "third": {"mine", "own"},
+        "fourth": {"own"},
+    }
+    named: dict[str, set[str]] = {}
+    for case in ElementTree.parse(tmp_path / "junit.xml").getroot().iter("testcase"):
+        places = [each.get("value", "") for each in case.iter("property")]
+        assert all((tmp_path / place / "recording.rrd").is_file() for place in places)
+        named[str(case.get("name"))] = {Path(place).name for place in places}
+    assert named == {
+        "test_first": set(),
+        **{f"test_{name}": runs for name, runs in kept.items()},
+        "test_nothing[1]": set(),
+        "test_nothing[2]": set(),
+    }
+    for name, runs in kept.items():
+        folder = tmp_path / "fivebar-artifacts" / f"tests-test_mine.py-test_{name}"
+        assert {place.name for place in folder.iterdir()} == runs
+    assert said.count("runs of the leg") == 3
+
+
+def test_plugin_asks_nothing_of_an_old_pluggy() -> None:
+    """One before 1.2 knows no `wrapper`, and would end every session of that Python."""
+    hooks = [each for name, each in vars(pytest_plugin).items() if name.startswith("pytest_")]
+    asked = [vars(hook)["pytest_impl"] for hook in hooks if "pytest_impl" in vars(hook)]
+    assert len(asked) == 3
+    assert not any(options["wrapper"] for options in asked)
 
 
 def test_failed_test_says_what_broke_and_keeps_its_runs(

@@ -25,7 +25,7 @@ def check(
     settings: Settings = (),
     update: bool = False,
     junit: Annotated[Path | None, arg(metavar="FILE")] = None,
-    summary: Annotated[Path | None, arg(metavar="FILE")] = None,
+    summary: Annotated[str, arg(metavar="FILE")] = "",
     keep: Annotated[Path, arg(metavar="DIR")] = Path("runs/failed"),
     quiet: bool = False,
 ) -> int:
@@ -42,7 +42,8 @@ def check(
         settings: Change one key of every scenario, e.g. sim.timestep=0.0005; may be repeated.
         update: Record the measured metrics as new baselines, for all runs within their limits.
         junit: Write the verdicts as JUnit XML.
-        summary: Append the verdicts as Markdown, for the page of a CI job ("$GITHUB_STEP_SUMMARY").
+        summary: Append the verdicts as Markdown, for the page of a CI job ("$GITHUB_STEP_SUMMARY");
+            "" for none, as that variable is outside of GitHub.
         keep: Folder for the run directories of failed scenarios, each under its name; replaced when
             the scenario fails again, never deleted.
         quiet: Print nothing but errors.
@@ -81,15 +82,15 @@ def check(
     return status
 
 
-def _publish(checked: list[Checked], junit: Path | None, summary: Path | None) -> None:
+def _publish(checked: list[Checked], junit: Path | None, summary: str) -> None:
     """Write the verdicts for a CI job, if requested."""
     from fivebar_sim.files import whole_file
     from fivebar_sim.regression import ci_files
 
     if junit is not None:
         whole_file.write(junit, ci_files.junit(checked))
-    if summary is not None:
-        whole_file.append(summary, ci_files.markdown(checked))
+    if summary:
+        whole_file.append(Path(summary), ci_files.markdown(checked))
 
 
 def _check_options(keep: Path, *, updates_changed: bool) -> None:
@@ -100,15 +101,15 @@ def _check_options(keep: Path, *, updates_changed: bool) -> None:
         raise ConfigError("--keep must name a directory, got the current one")
 
 
-def _check_places(junit: Path | None, summary: Path | None) -> None:
+def _check_places(junit: Path | None, summary: str) -> None:
     """Raise if the verdicts cannot be written."""
     from fivebar_sim.files import whole_file
 
     if junit is not None:
         whole_file.check_place(junit)
-    if summary is not None:
+    if summary:
         # A CI job's summary is shared by its steps, so it is only ever appended to.
-        whole_file.append(summary, "")
+        whole_file.append(Path(summary), "")
 
 
 def _check_names(orders: list[Order]) -> None:

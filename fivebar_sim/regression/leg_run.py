@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from math import inf
 from pathlib import Path
@@ -119,15 +119,14 @@ class LegRun:
 
 @dataclass(frozen=True, slots=True)
 class LegRunner:
-    """Runs scenarios for one test: the value of the fixture `leg_run`.
+    """Runs scenarios for tests: the value of the fixture `leg_run`.
 
     Attributes:
-        folder: Folder of the test file; scenarios are looked up beside it.
-        runs: Results of all runs of the test, which the plugin may keep.
+        place: Returns the folder of the test file, beside which scenarios are looked up, and the
+            list of results that the plugin may keep.
     """
 
-    folder: Path
-    runs: list[Result] = field(repr=False)
+    place: Callable[[], tuple[Path, list[Result]]] = field(repr=False)
 
     def __call__(
         self,
@@ -150,24 +149,30 @@ class LegRunner:
             DivergedError: The simulation broke down; says when.
         """
         __tracebackhide__ = True
+        folder, runs = self.place()
         try:
-            result = rollout.run(self._load(str(scenario), controller, settings))
+            result = rollout.run(_load(folder, str(scenario), controller, settings))
         except FiveBarError as error:
             # Shows the test's line and what is wrong, not the inside of fivebar_sim.
             raise error.with_traceback(None) from None
-        self.runs.append(result)
+        runs.append(result)
         return LegRun(result)
 
-    def _load(
-        self, source: str, controller: Setpoints | Feedback | None, settings: Sequence[str]
-    ) -> Scenario:
-        # A string is a sequence of strings too: each letter would be taken as a setting.
-        if isinstance(settings, str):
-            raise ConfigError(f'settings must be a list of "KEY=VALUE", got {settings!r}')
-        place = self.folder / source if source.endswith(".toml") else source
-        if controller is None:
-            return Scenario.load(place, settings)
-        for setting in settings:
-            if tables.parse_setting(setting)[0][0] == "controller":
-                raise ConfigError(f"settings change the controller, and one is given: {setting!r}")
-        return Scenario.load(place, [*settings, "controller={}"]).driven_by(controller)
+
+def _load(
+    folder: Path,
+    source: str,
+    controller: Setpoints | Feedback | None,
+    settings: Sequence[str],
+) -> Scenario:
+    """Return the scenario of a file in a folder, or a shipped one, with changes."""
+    # A string is a sequence of strings too: each letter would be taken as a setting.
+    if isinstance(settings, str):
+        raise ConfigError(f'settings must be a list of "KEY=VALUE", got {settings!r}')
+    place = folder / source if source.endswith(".toml") else source
+    if controller is None:
+        return Scenario.load(place, settings)
+    for setting in settings:
+        if tables.parse_setting(setting)[0][0] == "controller":
+            raise ConfigError(f"settings change the controller, and one is given: {setting!r}")
+    return Scenario.load(place, [*settings, "controller={}"]).driven_by(controller)
