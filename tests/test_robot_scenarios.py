@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import tomli_w
+from pyarrow import parquet
 from shell import Shell
 
 from fivebar_sim import Result, Scenario, rollout, run
@@ -242,3 +243,14 @@ def test_leg_out_of_reach_is_named_with_when_and_where(shell: Shell) -> None:
     assert said.status == 2
     assert "FL: " in said.err
     assert "out of reach" in said.err
+
+
+def test_sweep_has_the_metrics_of_robots(shell: Shell) -> None:
+    short = ["duration=0.1", "path.seconds=0.1", "path.ramp=0.05", "limits={}"]
+    settings = [word for setting in short for word in ("--set", setting)]
+    swept = shell("sweep", STAND, "--vary", "robot.mass=0.2:0.3:2", *settings, "--out", "s")
+    assert (swept.status, swept.err) == (0, "")
+    found = parquet.read_table("s/runs.parquet").to_pydict()
+    assert found["robot.mass"] == [0.2, 0.3]
+    assert found["robot.falls"] == [0.0, 0.0]
+    assert found["load.torque_rms.A"][0] < found["load.torque_rms.A"][1]

@@ -167,9 +167,8 @@ class Scenario(msgspec.Struct, frozen=True, kw_only=True):
         table = tables.read(path, "scenario")
         for setting in settings:
             reading.change(table, *tables.parse_setting(setting), str(source))
-        kind = _of_robots() if cls is Scenario and "robot" in table else cls
         # A file without a name gives the run its own; a key `name` in it, or a setting, wins.
-        return kind.from_table({"name": path.stem, **table}, str(source), path.parent)
+        return cls.from_table({"name": path.stem, **table}, str(source), path.parent)
 
     @classmethod
     def from_table(cls, table: Table, where: str, folder: Path) -> Scenario:
@@ -178,6 +177,8 @@ class Scenario(msgspec.Struct, frozen=True, kw_only=True):
         Raises:
             ConfigError: A value in the table is illegal; names the key.
         """
+        if cls is Scenario and "robot" in table:
+            return _of_robots().from_table(table, where, folder)
         tables.check_keys(table, KEYS, where)
         tables.check_finite(table, where)
         name, duration = reading.name_and_duration(table, where)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from fivebar_sim.arrays import Array
 from fivebar_sim.errors import ConfigError, UnknownError, unknown
 from fivebar_sim.files import whole_file
-from fivebar_sim.metrics.catalogue import LIMIT_KEYS, SHOWN
+from fivebar_sim.metrics.catalogue import SHOWN
 from fivebar_sim.render.palette import RUNS, TIME
 from fivebar_sim.report.look import colour, project_style
 from fivebar_sim.sweep.points import Points
@@ -63,8 +63,8 @@ def check(points: Points, metrics: Sequence[str], over: Sequence[str]) -> None:
         ConfigError: An unknown metric, a key that is not varied, or more than two.
     """
     for metric in metrics:
-        if metric not in LIMIT_KEYS:
-            raise UnknownError(f"--plot: {unknown('metric', metric, LIMIT_KEYS)}")
+        if metric not in SHOWN:
+            raise UnknownError(f"--plot: {unknown('metric', metric, SHOWN)}")
     for key in over:
         if key not in points.keys:
             raise UnknownError(f"--over: {unknown('key', key, points.keys)}: it is not varied")

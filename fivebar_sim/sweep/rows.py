@@ -7,11 +7,10 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from fivebar_sim.errors import FiveBarError
-from fivebar_sim.metrics.catalogue import LIMIT_KEYS
+from fivebar_sim.metrics.catalogue import SHOWN
 from fivebar_sim.metrics.limits import has, look_up
-from fivebar_sim.rollout import Result, execute, run_all
+from fivebar_sim.rollout import AnyPlan, Result, execute, plan, run_all
 from fivebar_sim.scenario import Scenario
-from fivebar_sim.simulation.plan import Plan, plan
 from fivebar_sim.sweep.axes import Axis
 from fivebar_sim.sweep.points import Points
 
@@ -42,7 +41,7 @@ def schema(points: Points) -> pa.Schema:
         pa.field("guards", pa.list_(pa.string())),
         pa.field("error", pa.string()),
     ]
-    return pa.schema([*columns, *(pa.field(key, pa.float64()) for key in LIMIT_KEYS)])
+    return pa.schema([*columns, *(pa.field(key, pa.float64()) for key in SHOWN)])
 
 
 def table(points: Points, numbers: Sequence[int], rows: Sequence[Row]) -> pa.Table:
@@ -62,7 +61,7 @@ def table(points: Points, numbers: Sequence[int], rows: Sequence[Row]) -> pa.Tab
         for axis, value in zip(points.axes, points.at(number), strict=True):
             for key in axis.keys:
                 columns[key].append(_written(axis, value))
-        for name in (*JUDGED, *LIMIT_KEYS):
+        for name in (*JUDGED, *SHOWN):
             columns[name].append(row.get(name))
     return pa.table(columns, schema=kinds)
 
@@ -99,7 +98,7 @@ def simulate(scenarios: Sequence[Scenario | str]) -> list[Row]:
         scenarios: Each a scenario, or the error of one that is refused.
     """
     rows: list[Row | None] = [None] * len(scenarios)
-    plans: dict[int, Plan] = {}
+    plans: dict[int, AnyPlan] = {}
     for k, scenario in enumerate(scenarios):
         if isinstance(scenario, str):
             rows[k] = {"error": scenario}
@@ -115,7 +114,7 @@ def simulate(scenarios: Sequence[Scenario | str]) -> list[Row]:
     return [row for row in rows if row is not None]
 
 
-def _results(plans: Sequence[Plan]) -> list[Result | FiveBarError]:
+def _results(plans: Sequence[AnyPlan]) -> list[Result | FiveBarError]:
     """Return what comes of plans."""
     try:
         return [*run_all(plans)]
@@ -124,7 +123,7 @@ def _results(plans: Sequence[Plan]) -> list[Result | FiveBarError]:
         return [_alone(planned) for planned in plans]
 
 
-def _alone(planned: Plan) -> Result | FiveBarError:
+def _alone(planned: AnyPlan) -> Result | FiveBarError:
     try:
         return execute(planned)
     except FiveBarError as error:
@@ -138,5 +137,5 @@ def _row(result: Result) -> Row:
         "verdict": result.verdict,
         "limits": [limit.key for limit in result.limits if not limit.ok],
         "guards": [guard.name for guard in result.measured.guards if not guard.ok],
-        **{key: look_up(metrics, key) for key in LIMIT_KEYS if has(metrics, key)},
+        **{key: look_up(metrics, key) for key in SHOWN if has(metrics, key)},
     }
