@@ -199,14 +199,26 @@ def _keep(result: Result, folder: Path, config: pytest.Config) -> tuple[str, str
 
 
 def _draw(result: Result, place: Path) -> list[str]:
-    """Write the pictures of the foot's path and of its error; return their names."""
-    from fivebar_sim.report import in_plane, look, over_time
+    """Write the pictures of the foot's path and of its error; return their names.
+
+    Of a robot those of its path from above, and of all feet's errors.
+    """
+    from fivebar_sim.report import in_plane, look, over_time, robot_figures
+    from fivebar_sim.robots.columns import trunk
+    from fivebar_sim.robots.scenario import RobotScenario
     from fivebar_sim.runs.stored import StoredRun
 
     run = StoredRun(place, result.scenario, result.record, result.measured)
     names = []
     with look.project_style():
-        for drawn in (in_plane.foot_path(run), over_time.tracking_error(run)):
+        if isinstance(result.scenario, RobotScenario):
+            body = trunk(result.record)
+            above = [] if body is None else [robot_figures.from_above(run, body)]
+            figures = [*above, robot_figures.errors(run)]
+        else:
+            figures = [in_plane.foot_path(run), over_time.tracking_error(run)]
+
+        for drawn in figures:
             names.append(f"{drawn.key}.png")
             (place / names[-1]).write_bytes(look.png(drawn.figure))
     return names

@@ -53,11 +53,11 @@ def page(run: StoredRun, drawn: list[Drawn]) -> str:
     scenario = run.scenario
     parts = [
         _head(run),
-        html.section("Limits", _limits(run), _guards(run)),
+        html.section("Limits", limits(run), guarded(run)),
         html.section("What happened", html.figures(drawn)),
         html.section("How the motors shared the load", _load(run), *_phase(run)),
-        html.section("All metrics", _metrics(run)),
-        html.section("What was run", *_what(run)),
+        html.section("All metrics", metrics(run)),
+        html.section("What was run", *what(run)),
     ]
     return html.page(f"{scenario.name}: {run.measured.verdict}", parts)
 
@@ -91,7 +91,7 @@ def _head(run: StoredRun) -> str:
     )
 
 
-def _limits(run: StoredRun) -> str:
+def limits(run: StoredRun) -> str:
     """Return the table of limits: bound, value, and whether it holds."""
     rows = [
         (SHOWN[limit.key][0], bounds(limit), shown(limit.key, limit.value), html.verdict(limit.ok))
@@ -104,7 +104,7 @@ def _limits(run: StoredRun) -> str:
     )
 
 
-def _guards(run: StoredRun) -> str:
+def guarded(run: StoredRun) -> str:
     """Return the guards, folded to one line; open if one tripped."""
     guarded = run.measured.guards
     lost = [guard.name for guard in guarded if not guard.ok]
@@ -197,12 +197,12 @@ def _phase(run: StoredRun) -> list[str]:
     return [html.table("Over the cycle of the path.", head, rows)]
 
 
-def _metrics(run: StoredRun) -> str:
+def metrics(run: StoredRun) -> str:
     """Return the table of every metric: for people, and as in metrics.json."""
     rows = []
     for key, value in numbers.flat_metrics(run).items():
-        # The load over the cycle has its own table.
-        if key.startswith("load.phase."):
+        # The load over the cycle, and that of each leg of a robot, have their own tables.
+        if key.startswith(("load.phase.", "legs.")):
             continue
         label, read = _words(key, value)
         rows.append((label, read, plain(value), html.key(key)))
@@ -235,7 +235,7 @@ def _words(key: str, value: Any) -> tuple[str, str]:
     return label + (", in stance" if alike != key else ""), plain(value)
 
 
-def _what(run: StoredRun) -> list[str]:
+def what(run: StoredRun) -> list[str]:
     """Return the command, the provenance of the numbers, and the resolved scenario."""
     # Quoted for a shell: a run directory may have blanks in its name.
     again = shlex.join(["fivebar", "run", f"{numbers.name_of(run)}/scenario.toml"])

@@ -8,8 +8,8 @@ from pathlib import Path
 
 from fivebar_sim.errors import ArgumentError, RunDirectoryError
 from fivebar_sim.files import whole_file
-from fivebar_sim.report import comparison, look, single
-from fivebar_sim.runs import stored
+from fivebar_sim.report import comparison, look, robot, single
+from fivebar_sim.runs import recorded, stored
 from fivebar_sim.runs.kept import REPORT
 
 
@@ -41,11 +41,16 @@ def write(runs: Sequence[Path], out: Path | None = None, png: Path | None = None
         raise RunDirectoryError(f"cannot write {place}: a directory is there")
 
     read = [stored.read(path) for path in runs]
+    if len(read) > 1 and recorded.all_of_robots(read):
+        raise ArgumentError(
+            f"runs of robots are not compared yet: a report has one, got {len(read)}"
+        )
     # All content is ready before the first file is written; the page comes last.
     files: dict[Path, bytes] = {}
     with look.project_style():
-        drawn = single.figures(read[0]) if len(read) == 1 else comparison.figures(read)
-        page = single.page(read[0], drawn) if len(read) == 1 else comparison.page(read, drawn)
+        kind = robot if recorded.all_of_robots(read) else single
+        drawn = kind.figures(read[0]) if len(read) == 1 else comparison.figures(read)
+        page = kind.page(read[0], drawn) if len(read) == 1 else comparison.page(read, drawn)
         if png is not None:
             files |= {png / f"{one.key}.png": look.png(one.figure) for one in drawn}
         files[place] = page.encode("utf-8", "backslashreplace")
