@@ -5,13 +5,16 @@ from __future__ import annotations
 import importlib.util
 import math
 import os
+import shutil
 import signal
+import subprocess
 import sys
 import time
 from collections import Counter
 from pathlib import Path
 from types import ModuleType
 
+import numpy as np
 import pytest
 from shell import Shell, started
 
@@ -168,6 +171,37 @@ def test_published_faults_are_found_and_nothing_else() -> None:
         assert report.right > 500
         assert report.troubles == []
         assert not report.passes
+
+
+def test_firmware_gives_its_own_bits(tmp_path: Path) -> None:
+    """The C code of `firmware/`, and with another last bit it is found."""
+    compiler = shutil.which("cc")
+    if compiler is None:
+        pytest.skip("there is no C compiler")
+    firmware = ROOT / "firmware"
+    sources = [str(PROGRAMS / "firmware.c"), str(firmware / "fivebar_leg.c")]
+    for flags, precision in (((), "firmware"), (("-DFIVEBAR_DOUBLE",), "float64")):
+        program = tmp_path / precision
+        strict = ["-std=c99", "-O2", "-Wall", "-Wextra", "-pedantic", "-Werror", *flags]
+        build = [compiler, *strict, "-I", str(firmware), "-o", str(program), *sources]
+        subprocess.run(build, check=True)
+        said = dialogue.ask([str(program)], judge.questions(LEGS), 60.0)
+        report = judge.judge(LEGS, said)
+        assert report.precision == precision
+        assert (report.right, report.faults, report.troubles) == (report.asked, [], [])
+
+    lines = dialogue.ask([str(tmp_path / "firmware")], judge.questions(LEGS), 60.0).lines
+    said = dialogue.Said(lines, "", "")
+    # One number of the first leg is moved by its last bit: well within float32.
+    row = next(k for k, line in enumerate(lines) if line.startswith("ok 0x"))
+    word = lines[row].split()[1]
+    moved = np.nextafter(np.float32(float.fromhex(word)), np.float32(np.inf))
+    lines[row] = lines[row].replace(word, float(moved).hex())
+    assert judge.judge(LEGS, said._replace(lines=lines)).by_kind().keys() == {
+        "inverse: other bits than the firmware's"
+    }
+    lines[0] = "float32"
+    assert judge.judge(LEGS, said._replace(lines=lines)).passes
 
 
 def test_command_says_what_is_wrong_and_where(shell: Shell) -> None:

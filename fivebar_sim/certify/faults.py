@@ -43,6 +43,7 @@ class Fault(NamedTuple):
         name: The number that is off most, or "".
         expected: What it should be.
         came: What it is.
+        own: The firmware's own answer, where its bits are what is wrong.
     """
 
     kind: str
@@ -51,6 +52,7 @@ class Fault(NamedTuple):
     name: str = ""
     expected: float = 0.0
     came: float = 0.0
+    own: str = ""
 
 
 def not_refused(case: Case, numbers: tuple[float, ...]) -> str:

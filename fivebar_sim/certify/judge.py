@@ -6,7 +6,7 @@ import itertools
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from fivebar_sim.certify import dialogue, faults
+from fivebar_sim.certify import bits, dialogue, faults
 from fivebar_sim.certify.exact import KEYS
 from fivebar_sim.certify.faults import Fault
 from fivebar_sim.certify.suite import ANSWERS, OK, PRECISIONS, REFUSALS, UNSUPPORTED, Case, Leg
@@ -14,6 +14,9 @@ from fivebar_sim.geometry import FiveBar
 
 GREETING = "fivebar 1"
 """The first line that a program gets; it answers with its precision."""
+
+FIRMWARE = "firmware"
+"""The precision of a program that is the firmware: its bits are compared too."""
 
 LEAST = 1
 """Right answers without which nothing is certified: a program may not leave out everything."""
@@ -79,19 +82,32 @@ def judge(legs: Sequence[Leg], said: dialogue.Said) -> Report:
         if taken is None:
             break
         supported = _is_taken(taken, troubles)
-        geometry = geometry_of(leg)
-        for case, line in zip(leg.cases, itertools.islice(answers, len(leg.cases)), strict=False):
-            if not supported or line.strip() == UNSUPPORTED:
-                left_out += 1
-                continue
-            fault = look(geometry, case, precision, line)
-            right += fault is None
-            if fault is not None:
-                found.append(fault)
+        lines = list(itertools.islice(answers, len(leg.cases)))
+        asked_for = [supported and line.strip() != UNSUPPORTED for line in lines]
+        wrong = _wrong(leg, precision, lines) if supported else []
+        found += wrong
+        left_out += len(lines) - sum(asked_for)
+        right += sum(asked_for) - len(wrong)
 
     if not troubles and right + len(found) < LEAST:
         troubles.append("it supports none of the questions")
     return Report(precision, asked, right, left_out, found, troubles)
+
+
+def _wrong(leg: Leg, precision: str, lines: Sequence[str]) -> list[Fault]:
+    """Return what is wrong with the answers to a leg's questions, as far as they came."""
+    geometry = geometry_of(leg)
+    golden = bits.answers(geometry, leg.cases) if precision == FIRMWARE else lines
+    found = []
+    for case, line, own in zip(leg.cases, lines, golden, strict=False):
+        if line.strip() == UNSUPPORTED:
+            continue
+        fault = look(geometry, case, precision, line)
+        if fault is None and not bits.same(line, own):
+            fault = Fault("other bits than the firmware's", case, line, own=own)
+        if fault is not None:
+            found.append(fault)
+    return found
 
 
 def _is_taken(line: str, troubles: list[str]) -> bool:

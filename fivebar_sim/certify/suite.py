@@ -22,7 +22,8 @@ UNSUPPORTED = "unsupported"
 ANSWERS = {"inverse": 2, "forward": 2, "knees": 4, "jacobian": 4, "torque": 2}
 """The kinds of questions, and how many numbers answer one."""
 
-PRECISIONS = ("float32", "float64", "degrees")
+PRECISIONS = ("float32", "float64", "degrees", "firmware")
+"""What a program says of itself; "firmware" is float32, and the firmware's own bits."""
 
 
 class Case(NamedTuple):

@@ -84,8 +84,11 @@ def _told(fault: Fault) -> str:
     signs = 2 if case.kind == "inverse" else 1
     values = [f"{float.fromhex(word):.9g}" for word in case.inputs[signs:]]
     where = f"{case.leg} ({case.trap}): {' '.join([case.kind, *case.inputs[:signs], *values])}"
+
     if not case.answer:
         return f"{where}: must be refused, got {fault.got.strip()!r}"
+    if fault.own:
+        return f"{where}: must be {fault.own!r}, got {fault.got.strip()!r}"
     if not fault.name:
         numbers = " ".join(f"{value:.9g}" for value in case.answer)
         return f"{where}: expected {numbers}, got {fault.got.strip()!r}"
