@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from shell import Shell
 
 from fivebar_sim import kinematics, setpoints
 from fivebar_sim.control import hobby
@@ -25,6 +26,12 @@ kind = "lines"
 points = [[0.0, -0.07], [0.01, -0.08]]
 seconds = 0.3
 """
+
+
+@pytest.fixture
+def shell(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]):
+    monkeypatch.chdir(tmp_path)
+    return Shell(tmp_path, capsys)
 
 
 @pytest.fixture(scope="module")
@@ -162,3 +169,28 @@ def test_refusals(ellipse: Scenario, tmp_path: Path) -> None:
     table = setpoints.rows(ellipse, 50.0)
     with pytest.raises(ConfigError, match=r"must end in \.h or \.csv"):
         setpoints.write(tmp_path / "a.txt", table, setpoints.commands(ellipse.leg, theta, "rad"))
+
+
+def test_command_writes_a_table(shell: Shell, tmp_path: Path) -> None:
+    out = shell("export", "classic-ellipse", "--table", "a.csv", "--unit", "us")
+    words = "servo commands, 500 to 2500: servo table 'hanging'"
+    assert out == (0, f"classic-ellipse: 25 rows, {words}, written to a.csv\n", "")
+    first = shell("export", "q8bot-trot", "--table", "b.h", "--unit", "count", "--servos", "xl330")
+    assert first.status == 0
+    assert "static const uint16_t q8bot_trot[" in (tmp_path / "b.h").read_text()
+    said = shell("export", "classic-ellipse", "--table", "c.h", "--unit", "us", "--ends", "0", "9")
+    assert "static const uint8_t classic_ellipse[" in (tmp_path / "c.h").read_text()
+    assert said.status == 0
+
+
+def test_command_refuses_in_one_line(shell: Shell) -> None:
+    assert shell.refused("export", "q8bot-trot") == "say what to export: --c DIR or --table FILE"
+    one = ("export", "classic-ellipse", "--table", "a.h")
+    assert shell.refused(*one, "--c", "x").endswith("export one at a time")
+    assert shell.refused(*one, "--ends", "0", "9") == (
+        "--ends is for the units count and us, got rad"
+    )
+    assert shell.refused(*one, "--unit", "published-rounded").startswith("90 deg + angle must be")
+    assert shell.refused(*one, "--rate", "33").endswith("use 32 or 34 Hz")
+    assert shell.refused("export", "classic", "--table", "a.h").startswith("unknown scenario")
+    assert shell.refused("export", "classic-ellipse", "--table", "a.txt").startswith("cannot write")

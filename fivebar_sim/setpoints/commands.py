@@ -89,6 +89,7 @@ def commands(
         raise ConfigError(unknown("unit", unit, UNITS))
     if servos not in SERVOS:
         raise ConfigError(unknown("servo table", servos, SERVOS))
+
     if unit == "rad":
         return Commands(theta, unit, "motor angles [rad]")
     if unit == "deg":
