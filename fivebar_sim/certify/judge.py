@@ -99,6 +99,7 @@ def _wrong(leg: Leg, precision: str, lines: Sequence[str]) -> list[Fault]:
     geometry = geometry_of(leg)
     golden = bits.answers(geometry, leg.cases) if precision == FIRMWARE else lines
     found = []
+
     for case, line, own in zip(leg.cases, lines, golden, strict=False):
         if line.strip() == UNSUPPORTED:
             continue
