@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import base64
+import hashlib
 import re
 from collections.abc import Iterable, Sequence
 from html import escape, unescape
@@ -96,13 +98,21 @@ def text(value: object) -> Cell:
     return value if isinstance(value, Cell) else Cell(escape(" ".join(str(value).split())))
 
 
-def page(title: str, parts: Iterable[str]) -> str:
+def page(title: str, parts: Iterable[str], *, style: str = "", script: str = "") -> str:
     """Return a whole page.
 
     Args:
         title: Title, as plain text.
         parts: HTML of the body, in order.
+        style: Further styles.
+        script: The page's own script; no other one runs in it.
     """
+    policy = POLICY
+    end = ""
+    if script:
+        digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
+        policy = f"{policy}; script-src 'sha256-{digest}'"
+        end = f"<script>{script}</script>\n"
     # The reader's choice of light or dark only sets these; figures use them too.
     light = look.variables(False)
     dark = look.variables(True)
@@ -112,17 +122,18 @@ def page(title: str, parts: Iterable[str]) -> str:
 <meta charset="utf-8">
 <meta name="viewport" content="width=device-width, initial-scale=1">
 <meta name="color-scheme" content="light dark">
-<meta http-equiv="Content-Security-Policy" content="{POLICY}">
+<meta http-equiv="Content-Security-Policy" content="{policy}">
 <title>{text(title)}</title>
 <style>
 :root {{ color-scheme: light dark; {light} }}
 @media screen and (prefers-color-scheme: dark) {{ :root {{ {dark} }} }}
-{STYLE.strip()}
+{(STYLE + style).strip()}
 </style>
 </head>
 <body>
 """
-    foot = f"<footer>Written by fivebar-sim {version('fivebar-sim')}.</footer>\n</body>\n</html>\n"
+    by = f"<footer>Written by fivebar-sim {version('fivebar-sim')}.</footer>"
+    foot = f"{by}\n{end}</body>\n</html>\n"
 
     return head + "\n".join(parts) + "\n" + foot
 
