@@ -11,7 +11,9 @@ from typing import NoReturn
 import pytest
 from shell import CSV, ELLIPSE, JUDGED, Shell
 
-from fivebar_sim import Result
+from fivebar_sim import FiveBar, Result, Scenario, control, paths
+from fivebar_sim.cli import list as list_command
+from fivebar_sim.files import resources
 from fivebar_sim.recording import rrd
 from fivebar_sim.report import single
 from fivebar_sim.runs.directory import FILES
@@ -54,6 +56,81 @@ def test_several_scenarios_go_into_a_folder(shell: Shell) -> None:
     for name in ("short", "classic-ellipse"):
         assert {f"all/{name}/{file}" for file in FILES} <= shell.names()
         assert f"written to {Path('all') / name}" in said.out
+    first, second, last = said.out.splitlines()
+    assert re.match(r"pass  short  tracking RMS [0-9.]+ mm  written to all", first)
+    assert second.startswith("pass  classic-ellipse  tracking RMS 1.19")
+    assert last == "2 runs: 2 pass"
+
+
+def test_last_line_of_several_names_what_failed(shell: Shell) -> None:
+    for name, more in {
+        "strict": "[limits]\ntracking.rms = 1e-9\n",
+        "free": "",
+        "wild": "[sim]\nintegrator='implicitfast'\ntimestep=0.02\n",
+    }.items():
+        text = ELLIPSE.replace("short", name) + more
+        Path(f"{name}.toml").write_text(text, encoding="utf-8")
+    said = shell("run", "short.toml", "strict.toml", "free.toml", "wild.toml")
+    assert said.status == 1
+    lines = said.out.splitlines()
+    assert lines[1].startswith("FAIL  strict  tracking RMS")
+    assert re.fullmatch(r"  tracking RMS: [0-9.]+ mm, limit <= 1 nm", lines[2])
+    assert lines[3].startswith("not judged (guards hold)  free")
+    assert lines[4] == "4 runs: 1 pass, 1 fail, 1 not judged, 1 diverged: strict, wild"
+    assert said.err.startswith("fivebar: wild: ")
+
+
+def test_what_is_listed_can_be_used(shell: Shell) -> None:
+    said = shell("list")
+    assert (said.status, said.err) == (0, "")
+    names = {kind: set[str]() for kind in list_command.WHATS}
+    kind = ""
+    for line in said.out.splitlines():
+        kind = line.split(":")[0] if re.match(r"\w+: ", line) else kind
+        named = re.match(r"  (\S+)  +\S", line)
+        if named:
+            names[kind].add(named[1])
+    assert names == {
+        "scenarios": set(resources.shipped("scenarios")),
+        "legs": set(resources.shipped("models/legs")),
+        "servos": set(resources.shipped("models/servos")),
+        "robots": set(resources.shipped("models/robots")),
+        "paths": set(paths.kinds()),
+        "controllers": set(control.known()),
+    }
+    for kind, known in names.items():
+        alone = shell("list", kind).out
+        assert alone in said.out + "\n"
+        assert all(f"  {name} " in alone for name in known)
+    assert shell.refused("list", "leg").endswith("(did you mean 'legs'?)")
+
+
+def test_new_scenario_runs_and_all_its_lines_are_legal(shell: Shell) -> None:
+    assert shell("new", "first.toml").status == 0
+    text = Path("first.toml").read_text("utf-8")
+    Scenario.load("first.toml")
+    assert shell("run", "first.toml", "--set", "duration=1.0", "--quiet").status == 0
+    # Each comment that is a key or a table belongs to the table above it.
+    every = re.sub(r"^# (?=\[limits\]|[a-zA-Z_0-9.]+ = )", "", text, flags=re.MULTILINE)
+    assert every.count("\n#") < text.count("\n#") - 15
+    Path("every.toml").write_text(every, encoding="utf-8")
+    whole = Scenario.load("every.toml")
+    assert len(whole.limits) == 3
+    assert whole.servo.delay == 0.002
+    kept = {"L1", "L2", "L3", "L4", "L5", "density"}
+    assert {key: getattr(whole.leg, key) for key in kept} == {
+        key: getattr(FiveBar.load("classic"), key) for key in kept
+    }
+    for line in text.splitlines():
+        number = re.match(r"#? ?\w+ = \[?[0-9.e-]+", line)
+        unitless = re.match(r"#? ?(load\.share_A|seed)", line)
+        assert not number or unitless or re.search(r"# \[[^]]+\]", line), line
+
+
+def test_new_scenario_replaces_nothing(shell: Shell) -> None:
+    assert shell.refused("new", "short.toml") == "short.toml exists already: choose another name"
+    assert shell.refused("new", "mine") == "a scenario is a .toml file, got 'mine'"
+    assert "No such file" in shell.refused("new", "nowhere/mine.toml")
 
 
 def test_settings_repeat_and_reach_every_scenario(shell: Shell) -> None:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections import Counter
+from collections.abc import Collection, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from rich import box
@@ -13,7 +14,7 @@ from rich.table import Table
 
 from fivebar_sim.metrics import guards
 from fivebar_sim.metrics.catalogue import SHOWN, shown
-from fivebar_sim.metrics.limits import bounds
+from fivebar_sim.metrics.limits import bounds, has, look_up
 from fivebar_sim.metrics.measured import NOT_JUDGED
 from fivebar_sim.runs.side_by_side import side_by_side
 
@@ -26,6 +27,8 @@ if TYPE_CHECKING:
 WIDEST = 300
 """Widest table in a file or a pipe, in characters; there a table takes what it needs."""
 
+FIRST = ("tracking.rms", "robot.speed")
+"""Metrics for the line of a run: the first that it has."""
 
 WORDS = {
     "pass": "[green]pass[/green]",
@@ -67,6 +70,39 @@ def print_result(result: Result, remarks: Sequence[str], where: str, console: Co
         console.print(f"[yellow]warning: {escape(remark)}[/yellow]", soft_wrap=True)
 
     console.print(f"verdict: {WORDS[result.verdict]}   written to {escape(where)}", soft_wrap=True)
+
+
+def print_line(result: Result, remarks: Sequence[str], where: str, console: Console) -> None:
+    """Print one of several runs as a line; below it what failed, and warnings.
+
+    The arguments are those of `print_result`.
+    """
+    from fivebar_sim.regression import comparison
+
+    first = [key for key in FIRST if has(result.metrics, key)][:1]
+    said = [f"{SHOWN[key][0]} {shown(key, look_up(result.metrics, key))}" for key in first]
+    line = "  ".join([WORDS[result.verdict], escape(result.scenario.name), *said])
+    console.print(f"{line}  written to {escape(where)}", soft_wrap=True)
+
+    failures = comparison.compare(result, None).failures
+    for failure in failures if result.verdict == "fail" else ():
+        console.print(f"  [red]{escape(failure)}[/red]", soft_wrap=True)
+    for remark in remarks:
+        console.print(f"  [yellow]warning: {escape(remark)}[/yellow]", soft_wrap=True)
+
+
+def print_summary(verdicts: Mapping[str, str], console: Console) -> None:
+    """Print how many of several runs have which verdict, and which of them failed.
+
+    Args:
+        verdicts: Verdict of each scenario by name; "diverged" where there is none.
+        console: Where to print.
+    """
+    counts = Counter(verdicts.values())
+    parts = [f"{count} {verdict}" for verdict, count in counts.items()]
+    bad = [name for name, verdict in verdicts.items() if verdict in ("fail", "diverged")]
+    line = f"{len(verdicts)} runs: {', '.join(parts)}"
+    console.print(line + (f": {escape(', '.join(bad))}" if bad else ""), soft_wrap=True)
 
 
 def print_check(checked: Sequence[Checked], console: Console) -> None:

@@ -20,6 +20,8 @@ from fivebar_sim.cli.terminal import FAILED, INTERRUPTED, UNREAD, WRONG, say
 from fivebar_sim.errors import ConfigError, DivergedError, FiveBarError, unknown
 
 COMMANDS = {
+    "list": "List scenarios, legs, servos, robots, paths and controllers.",
+    "new": "Write a scenario to start from, with comments and units.",
     "run": "Simulate scenarios, check their limits, write run directories.",
     "check": "Check scenarios against limits, guards and recorded baselines.",
     "converge": "Show which metrics a scenario's timestep already gets right.",

@@ -12,6 +12,8 @@ from fivebar_sim.cli.terminal import FAILED, say
 from fivebar_sim.errors import ConfigError, DivergedError
 
 if TYPE_CHECKING:
+    from rich.console import Console
+
     from fivebar_sim.rollout import Result
 
 
@@ -27,6 +29,8 @@ def run(
     json: bool = False,
 ) -> int:
     """Simulate scenarios, check their limits, write run directories.
+
+    One scenario's metrics are a table; of several each is a line, and the last line sums them up.
 
     Exit status: 1 if a limit is broken, a guard trips or a run diverges, 2 for wrong input. A
     scenario without limits is not judged: its status is 0 if its guards hold.
@@ -111,6 +115,7 @@ def _run(
 
     status = 0
     metrics = {}
+    verdicts: dict[str, str] = {}
     out = None if quiet or as_json else screen()
     for order, place in zip(orders, places, strict=True):
         name = order.scenario.name
@@ -125,18 +130,33 @@ def _run(
             # An older "pass" there would look like this run's.
             directory.discard(place, str(error))
             status = FAILED
+            verdicts[name] = "diverged"
             continue
         metrics[name] = result.metrics
+        verdicts[name] = result.verdict
         status = max(status, FAILED if result.verdict == "fail" else 0)
         if out is not None:
-            from fivebar_sim.cli import console
+            _show(result, remarks, place, out, alone=len(orders) == 1)
 
-            console.print_result(result, remarks, str(place), out)
+    if out is not None and len(orders) > 1:
+        from fivebar_sim.cli import console
+
+        console.print_summary(verdicts, out)
 
     if as_json:
         shown = next(iter(metrics.values()), None) if len(orders) == 1 else metrics
         print(json.dumps(shown, indent=2, allow_nan=False))  # noqa: T201
     return status
+
+
+def _show(
+    result: Result, remarks: list[str], place: Path, out: Console, *, alone: bool
+) -> None:
+    """Print the table of a run that is the only one, or the line of one of several."""
+    from fivebar_sim.cli import console
+
+    show = console.print_result if alone else console.print_line
+    show(result, remarks, str(place), out)
 
 
 def _write(result: Result, place: Path) -> None:
