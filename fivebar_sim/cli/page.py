@@ -14,7 +14,7 @@ def page(
     *,
     out: Annotated[Path | None, arg(metavar="HTML")] = None,
 ) -> int:
-    """Write a leg to play with on one HTML page: the firmware's code in the browser.
+    """Write a leg to play with on one HTML page, in any browser.
 
     Drag the foot and the force on it, move the links, draw a path. The page needs no server and no
     network.

@@ -34,7 +34,7 @@ COMMANDS = {
     "workspace": "Draw what a leg's foot can reach, and how deep inside it is.",
     "certify": "Check any program that computes a leg against known answers.",
     "export": "Write a leg as a C library, or a scenario's gait as a table.",
-    "page": "Write a leg to play with on one HTML page: the firmware's code in the browser.",
+    "page": "Write a leg to play with on one HTML page, in any browser.",
 }
 """The commands, each with the first line of its help.
 
