@@ -47,6 +47,10 @@ def legend(replay: Replay) -> list[Entry]:
         Entry("foot", f"foot, last {trail_seconds(replay):.2g} s"),
     ]
     largest = float(np.hypot(*replay.ground.T).max())
+    if replay.walked is not None:
+        # Of a robot's feet neither targets nor trails are drawn: they would hide the legs.
+        entries = []
+        largest = float(np.linalg.norm(replay.walked.forces, axis=-1).max())
     if largest > 0.0:
         entries.append(Entry("force", f"ground, max {largest:.3g} N"))
     return entries
@@ -94,7 +98,8 @@ class Caption:
         time = (row + 1) * self._replay.scenario.sim.timestep
         middle = self._seen[1] + self._strip.height / 2
         self._text(draw, self._letters, middle, f"t = {time:.3f} s", "ink", "lm")
-        self._draw_letters(draw, row)
+        if self._replay.walked is None:
+            self._draw_letters(draw, row)
         return np.asarray(whole)
 
     def _draw_letters(self, draw: ImageDraw, row: int) -> None:

@@ -182,9 +182,11 @@ class Stage:
         data = self._data
         data.qpos[:] = self._replay.qpos[row]
         mujoco.mj_forward(model, data)
+        here = self.camera._replace(centre=self.camera.centre + self._replay.place(row))
+        here.aim(self._view)
         every = mujoco.mjtCatBit.mjCAT_ALL
         mujoco.mjv_updateScene(model, data, self._option, None, self._view, every, self.scene)
-        scene.decorate(self.scene, self._replay, row, self.camera.eye)
+        scene.decorate(self.scene, self._replay, row, here.eye)
         # Another stage of this thread may have made its own context current since.
         self._gl.make_current()
         mujoco.mjr_render(self._rect, self.scene, self._mjr)

@@ -16,7 +16,7 @@ from fivebar_sim import kinematics
 from fivebar_sim.arrays import Array
 from fivebar_sim.render.palette import COLOURS, unit_rgb
 from fivebar_sim.render.pen import Colour, Pen
-from fivebar_sim.render.replay import Replay
+from fivebar_sim.render.replay import Replay, Walked
 
 FIELD = 20.0
 DOWN = 9.0
@@ -173,6 +173,9 @@ def decorate(scene: mujoco.MjvScene, replay: Replay, row: int, eye: Array) -> No
         eye: Position of the camera [m], (3,).
     """
     leg = replay.scenario.leg
+    if replay.walked is not None:
+        _forces(Pen(scene, eye, 0.0), replay, replay.walked, row)
+        return
     hip = np.array([0.0, replay.hip[row]])
     pen = Pen(scene, eye, 1.6 * leg.foot_radius + leg.radius)
     _pins(pen, replay, row, hip)
@@ -234,6 +237,16 @@ def _force(pen: Pen, replay: Replay, row: int, hip: Array) -> None:
         start = replay.foot[row] + hip - (0.0, leg.foot_radius)
         tip = start + leg.size * force / largest
         pen.arrow(pen.before(start, 2.0), pen.before(tip, 2.0), 0.45 * leg.foot_radius, FORCE)
+
+
+def _forces(pen: Pen, replay: Replay, walked: Walked, row: int) -> None:
+    """Draw the floor's force on each foot; the run's largest is as long as a leg."""
+    leg = replay.scenario.leg
+    largest = float(np.linalg.norm(walked.forces, axis=-1).max())
+    for place, force in zip(walked.feet[:, row], walked.forces[:, row], strict=True):
+        if np.linalg.norm(force) > 0.01 * largest:
+            start = place - (0.0, 0.0, leg.foot_radius)
+            pen.arrow(start, start + leg.size * force / largest, 0.45 * leg.foot_radius, FORCE)
 
 
 def _belt(pen: Pen, replay: Replay, row: int) -> None:

@@ -95,6 +95,9 @@ def play(replay: Replay, clock: Callable[[], float] = time.monotonic) -> None:
                 mujoco.mj_forward(replay.model, data)
                 window.user_scn.ngeom = 0
                 scene.decorate(window.user_scn, replay, row, camera.eye)
+                # Past a robot that walks on, the camera would look at an empty floor.
+                if replay.walked is not None:
+                    window.cam.lookat[:2] = replay.place(row)[:2]
             window.sync()
             time.sleep(SECONDS)
 

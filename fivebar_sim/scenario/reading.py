@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import math
 import re
 from collections.abc import Callable, Iterable, Mapping
@@ -74,6 +75,12 @@ def change(table: Table, parts: list[str], value: Any, where: str) -> None:
     if parts == ["controller", "name"] and value in control.known():
         known = ["name", *tables.keys(control.find(value))]
         table["controller"] = {k: v for k, v in table["controller"].items() if k in known}
+
+
+def of_robots() -> Any:
+    """Return the class of robots' scenarios."""
+    # By name, as controllers are found: it stands above this room, whose parts robots are made of.
+    return importlib.import_module("fivebar_sim.robots.scenario").RobotScenario
 
 
 def name_and_duration(table: Table, where: str) -> tuple[str, float]:

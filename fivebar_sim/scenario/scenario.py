@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 import math
 from collections.abc import Iterable
 from dataclasses import asdict
@@ -178,7 +177,7 @@ class Scenario(msgspec.Struct, frozen=True, kw_only=True):
             ConfigError: A value in the table is illegal; names the key.
         """
         if cls is Scenario and "robot" in table:
-            return _of_robots().from_table(table, where, folder)
+            return reading.of_robots().from_table(table, where, folder)
         tables.check_keys(table, KEYS, where)
         tables.check_finite(table, where)
         name, duration = reading.name_and_duration(table, where)
@@ -293,12 +292,6 @@ def copied_name(part: FootPath | FootForce | None) -> str | None:
         return None
     name = Path(part.file).name
     return name if name.endswith(".csv") else f"{name}.csv"
-
-
-def _of_robots() -> type[Scenario]:
-    """Return the class of robots' scenarios."""
-    # By name, as controllers are found: it stands above this room, whose parts robots are made of.
-    return importlib.import_module("fivebar_sim.robots.scenario").RobotScenario
 
 
 def _present(table: Table) -> Table:
