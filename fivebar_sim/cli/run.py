@@ -149,9 +149,7 @@ def _run(
     return status
 
 
-def _show(
-    result: Result, remarks: list[str], place: Path, out: Console, *, alone: bool
-) -> None:
+def _show(result: Result, remarks: list[str], place: Path, out: Console, *, alone: bool) -> None:
     """Print the table of a run that is the only one, or the line of one of several."""
     from fivebar_sim.cli import console
 
