@@ -142,7 +142,8 @@ def copied() -> Iterator[Path]:
     with tempfile.TemporaryDirectory() as temporary:
         folder = Path(temporary).resolve()
         for name in mutate.COPIED:
-            ignored = shutil.ignore_patterns("__pycache__", "*.rrd")
+            # With its bytecode, which holds while a file keeps its time: else all is compiled.
+            ignored = shutil.ignore_patterns("*.rrd")
             shutil.copytree(mutate.ROOT / name, folder / name, ignore=ignored)
         shutil.copy(mutate.ROOT / "pyproject.toml", folder)
         yield folder

@@ -47,10 +47,10 @@ print(json.dumps(came))
 
 
 @pytest.fixture
-def fivebar(tmp_path: Path) -> Program:
+def fivebar(tmp_path: Path, without_pandas: None) -> Program:
     """Return what calls commands of a copy of the package that has the page's metric."""
-    ignored = shutil.ignore_patterns("__pycache__")
-    shutil.copytree(ROOT / "fivebar_sim", tmp_path / "fivebar_sim", ignore=ignored)
+    # With its bytecode, which holds while a file keeps its time: else all of it is compiled.
+    shutil.copytree(ROOT / "fivebar_sim", tmp_path / "fivebar_sim")
     for name in ("models", "scenarios", "controllers"):
         (tmp_path / name).symlink_to(ROOT / name)
 
@@ -62,11 +62,13 @@ def fivebar(tmp_path: Path) -> Program:
     before, begin, after = catalogue.read_text().partition("CATALOGUE = (\n")
     catalogue.write_text(f"{before}{begin}{row},\n{after}")
 
+    path = os.pathsep.join([str(tmp_path), os.environ["PYTHONPATH"]])
+
     def program(*commands: str) -> list[Said]:
         done = subprocess.run(
             [sys.executable, "-c", COMMANDS, json.dumps(commands)],
             cwd=tmp_path,
-            env={**os.environ, "PYTHONPATH": str(tmp_path), "COLUMNS": "80"},
+            env={**os.environ, "PYTHONPATH": path, "COLUMNS": "80"},
             capture_output=True,
             text=True,
             check=False,
