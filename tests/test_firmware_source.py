@@ -9,6 +9,8 @@ from pathlib import Path
 import pytest
 from firmware_builds import HERE, M4F, TARGETS, need, run, source
 
+from fivebar_sim.certify import dialogue, judge, suite
+
 WARNINGS = ("-Wall", "-Wextra", "-Wconversion", "-Wdouble-promotion", "-pedantic", "-Werror")
 
 MOST_BYTES = 2048
@@ -54,6 +56,18 @@ def test_sanitizers_find_nothing(switch: tuple[str, ...], tmp_path: Path) -> Non
     parts = (HERE / "bits.c", HERE / "main.c", source())
     run("cc", "-O1", "-ffp-contract=off", *SAFE, *switch, include, *parts, "-o", program)
     run(program, "0", "3000", "3000")
+
+
+def test_sanitizers_find_nothing_over_the_conformance_set(tmp_path: Path) -> None:
+    need("cc")
+    program = tmp_path / "certified"
+    include = f"-I{source().parent}"
+    speaker = Path(__file__).parent / "leg_programs" / "firmware.c"
+    run("cc", "-O1", *SAFE, include, speaker, source(), "-o", program)
+    legs = suite.load()
+    # What a sanitizer finds ends the program, and its answers with it.
+    report = judge.judge(legs, dialogue.ask([str(program)], judge.questions(legs), 60.0))
+    assert (report.right, report.troubles) == (report.asked, [])
 
 
 def test_inverse_and_forward_are_small_on_a_cortex_m4f(tmp_path: Path) -> None:

@@ -37,4 +37,5 @@ def rounding(leg: FiveBar, foot: ArrayLike, theta: ArrayLike) -> Array:
             f"{Status(int(status[index])).name}",
             index,
         )
+
     return wrap(angles.astype(np.float64) - as_pairs(theta, "theta"))
