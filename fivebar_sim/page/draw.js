@@ -249,7 +249,12 @@ export function force(context, view, colours, state, largest) {
   circle(context, to, 6, colours.paper, colours.force, 2.5);
   const newtons = length(state.force);
   const beyond = direction(long > 12 ? sub(to, from) : [1, -1]);
-  const at = add(to, [Math.cos(beyond) * 30, Math.sin(beyond) * 18]);
+  // The number stays in sight wherever the arrow points.
+  const within = (value, most, margin) => Math.min(Math.max(value, margin), most - margin);
+  const at = [
+    within(to[0] + Math.cos(beyond) * 30, view.width, 30),
+    within(to[1] + Math.sin(beyond) * 18, view.height, 14),
+  ];
   letters(context, colours, `${newtons.toFixed(1)} N`, at, { colour: colours.force, size: 13, bold: true });
 }
 
