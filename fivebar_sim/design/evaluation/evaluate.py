@@ -13,7 +13,6 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fivebar_sim.arrays import Array, Bools
 from fivebar_sim.design.evaluation import measures
@@ -21,7 +20,7 @@ from fivebar_sim.design.evaluation.legs import Legs, Rows
 from fivebar_sim.design.evaluation.measures import Limit, limits
 from fivebar_sim.design.evaluation.motors import Motors
 from fivebar_sim.design.evaluation.objectives import CATALOGUE, Driven, Found
-from fivebar_sim.design.evaluation.poses import Poses, rates, slopes, solved, taken, torques
+from fivebar_sim.design.evaluation.poses import Poses, rates, solved, taken, torques
 from fivebar_sim.design.task.motions import Moving
 from fivebar_sim.design.task.task import Task
 from fivebar_sim.errors import ArgumentError
@@ -154,7 +153,7 @@ class _Block:
         motors = task.motors(self.values)
 
         self._put("closes", legs.closes)
-        legs = self._kept(legs)
+        legs, _ = self._still(legs, [])
         if len(self.rows):
             self._follow(legs, motors, objectives)
 
@@ -173,20 +172,19 @@ class _Block:
             return
 
         worst = self._geometric(legs, poses)
-        before = self.rows
+        kept = self._kept()
         legs, poses = self._still(legs, poses)
         if len(self.rows):
-            found = self._found(
-                legs, motors.take(self.rows), poses, worst[np.isin(before, self.rows)]
-            )
+            found = self._found(legs, motors.take(self.rows), poses, worst[kept])
             self._last(found, objectives)
 
     def _still(self, legs: Legs, poses: list[Poses]) -> tuple[Legs, list[Poses]]:
         """Drop designs that fail; return the legs and the poses of the others."""
-        before = self.rows
-        legs = self._kept(legs)
-        left = np.isin(before, self.rows)
-        return legs, poses if left.all() else [taken(p, left) for p in poses]
+        kept = self._kept()
+        if kept.all():
+            return legs, poses
+        self.rows = self.rows[kept]
+        return legs.take(kept), [taken(p, kept) for p in poses]
 
     def _points(self) -> Iterator[tuple[Array, Array]]:
         """Yield the foot positions of every motion, then of every region."""
@@ -197,6 +195,11 @@ class _Block:
         for cover in self.task.covers:
             yield self.task.points(cover, values)
 
+    def _wanted(self) -> set[str]:
+        """Return the objectives that are sought or bounded."""
+        constraints = self.task.constraints
+        return {*self.task.objectives, *constraints.most, *constraints.least}
+
     def _put(self, name: str, measure: Array) -> None:
         """Keep a measure of the designs that are left, if it is limited."""
         for k, each in enumerate(self.bounds):
@@ -204,28 +207,24 @@ class _Block:
                 self.measures[self.rows, k] = measure
                 self.measured.add(k)
 
-    def _survivors(self) -> NDArray[np.int_]:
-        """Return those of the designs left that keep to all that is known of them."""
+    def _kept(self) -> Bools:
+        """Return which of the designs left keep to all that is known of them."""
         done = sorted(self.measured)
         known = self.measures[self.rows][:, done]
         # A measure that came out NaN, as of a singular pose, is kept to by nothing.
         kept = [self.bounds[k].violation(known[:, i]) == 0.0 for i, k in enumerate(done)]
-        return self.rows[np.all(kept, axis=0)]
-
-    def _kept(self, legs: Legs) -> Legs:
-        """Drop designs that fail; return the legs of the others."""
-        left = self._survivors()
-        legs = legs.take(np.isin(self.rows, left))
-        self.rows = left
-        return legs
+        return np.all(kept, axis=0)
 
     def _geometric(self, legs: Legs, poses: list[Poses]) -> Array:
         """Measure what needs no torques; return the worst condition number, (n,)."""
         c = self.task.constraints
         moving = poses[: len(self.task.motions)]
 
-        worst = np.maximum.reduce([measures.worst_condition(legs, p) for p in poses])
-        self._put("worst_condition", worst)
+        worst = np.full(len(self.rows), np.nan)
+        # Only where somebody asks for it: it costs a tenth of everything.
+        if c.condition is not None or "condition" in self._wanted():
+            worst = np.maximum.reduce([measures.worst_condition(legs, p) for p in poses])
+            self._put("worst_condition", worst)
         for joint, (low, high) in c.stops.items():
             parts = [measures.beyond_stop(joint, low, high, p) for p in moving or poses]
             self._put(f"stop_{joint}", np.maximum.reduce(parts))
@@ -251,8 +250,7 @@ class _Block:
         task = self.task
         if any(each.name == "line" for each in self.bounds):
             self._put("line", measures.line_used(found.motors, found.driven))
-        known = {*task.objectives, *task.constraints.most, *task.constraints.least}
-        measured = {name: CATALOGUE[name].measure(found) for name in sorted(known)}
+        measured = {name: CATALOGUE[name].measure(found) for name in sorted(self._wanted())}
         for name in task.constraints.most:
             self._put(f"most_{name}", measured[name])
         for name in task.constraints.least:
@@ -274,7 +272,6 @@ def _driven(weight: float, legs: Legs, motors: Motors, p: Poses, moving: Moving)
         poses=p,
         pose=pose,
         rates=turning,
-        slopes=slopes(legs, p, pose),
         torque=torque,
         payload=moving.payload,
     )

@@ -12,7 +12,7 @@ from fivebar_sim.control.servo import Servo
 from fivebar_sim.design.evaluation import reach_area
 from fivebar_sim.design.evaluation.legs import Legs
 from fivebar_sim.design.evaluation.motors import Motors
-from fivebar_sim.design.evaluation.poses import Poses, Rates, Slopes, side
+from fivebar_sim.design.evaluation.poses import Poses, Rates, side, slopes
 from fivebar_sim.dynamics.chain import Pose, Vector
 from fivebar_sim.errors import ConfigError, unknown
 
@@ -26,7 +26,6 @@ class Driven(NamedTuple):
         poses: The poses.
         pose: Directions of the links and how the loop couples them.
         rates: How the links turn.
-        slopes: The foot's Jacobian.
         torque: (tau_A, tau_E) [N m].
         payload: At the foot [kg].
     """
@@ -36,7 +35,6 @@ class Driven(NamedTuple):
     poses: Poses
     pose: Pose
     rates: Rates
-    slopes: Slopes
     torque: Vector
     payload: Array
 
@@ -180,8 +178,9 @@ def _antagonism(found: Found) -> Array:
 
 def _serial_squares(legs: Legs, m: Driven) -> Array:
     """Return the sum of the squared torques of the serial leg with links like L1 and BF."""
-    det = m.slopes.determinant
-    (A_x, A_z), (E_x, E_z) = m.slopes
+    J = slopes(legs, m.poses, m.pose)
+    det = J.determinant
+    (A_x, A_z), (E_x, E_z) = J
     tau_A, tau_E = m.torque
     f_x = (tau_A * E_z - tau_E * A_z) / det
     f_z = (A_x * tau_E - E_x * tau_A) / det
@@ -203,9 +202,10 @@ def _reflected(found: Found) -> Array:
     """Largest inertia that the world feels at the foot, in its worst direction."""
 
     def felt(m: Driven) -> Array:
+        J = slopes(found.legs, m.poses, m.pose)
         M_AA, M_AE, M_EE = found.legs.chain(0.0).mass(m.pose)
-        (A_x, A_z), (E_x, E_z) = m.slopes
-        det2 = m.slopes.determinant**2
+        (A_x, A_z), (E_x, E_z) = J
+        det2 = J.determinant**2
         # Trace and determinant of J^-T M J^-1, whose larger eigenvalue is asked for.
         trace = (
             M_AA * (E_x**2 + E_z**2)
@@ -222,7 +222,8 @@ def _force(found: Found) -> Array:
     """Least force that the foot can give in every direction, both motors at their limit at most."""
 
     def longest(m: Driven) -> Array:
-        lengths = (x * x + z * z for x, z in m.slopes)
+        J = slopes(found.legs, m.poses, m.pose)
+        lengths = (x * x + z * z for x, z in J)
         return np.sqrt(np.maximum(*lengths))
 
     return found.motors.limit[:, 0] / _most(found, longest)
