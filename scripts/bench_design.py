@@ -1,4 +1,4 @@
-""".venv/bin/python scripts/bench_design.py  # how many designs are evaluated a minute, and the memory.
+""".venv/bin/python scripts/bench_design.py  # designs evaluated a minute, and the memory it takes.
 
 Searches a Sobol sample of a task with 64 samples of a gait in stance, its torques, and the
 constraints reach, singularity, joint speed and torque (the torque-speed line). Prints designs a

@@ -52,7 +52,7 @@ from shown import (
 
 ROOT = Path(__file__).resolve().parent.parent
 COPIED = (
-    *("docs", "examples", "models", "scenarios", "conformance", "scripts", "tests"),
+    *("docs", "examples", "models", "scenarios", "conformance", "designs", "scripts", "tests"),
     "pyproject.toml",
 )
 CODE = re.compile(r"`[^`]+`")
