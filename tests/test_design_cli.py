@@ -48,7 +48,8 @@ def write(folder: Path, text: str = TASK) -> str:
 def test_search_leaves_tables_and_legs(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     source = write(tmp_path)
     out = tmp_path / "out"
-    assert main(["design", source, "--out", str(out), "--threads", "1"]) == 0
+    quick = ["--tolerance", "0", "--simulate", "2"]
+    assert main(["design", source, "--out", str(out), "--threads", "1", *quick]) == 0
     shown = capsys.readouterr().out
     assert "mine: 36 designs" in shown
     assert "a minute" in shown
@@ -56,6 +57,14 @@ def test_search_leaves_tables_and_legs(tmp_path: Path, capsys: pytest.CaptureFix
     table = pq.read_table(out / "designs.parquet")
     assert table.num_rows == 36
     assert table.column_names == [*(each.name for each in design.columns(task)), "feasible"]
+    # One design has no rank.
+    assert "rank correlation" not in shown
+    simulated = pq.read_table(out / "simulated.parquet").to_pylist()
+    assert [row["design"] for row in simulated] == [0]
+    page = (out / "report.html").read_text(encoding="utf-8")
+    assert "best/mine-01.toml" in page
+    assert "1 designs in MuJoCo" in page
+    assert not (out / "built.json").exists()
     front = pq.read_table(out / "front.parquet")
     told = json.loads((out / "best.json").read_text(encoding="utf-8"))
     assert [Path(each["file"]).name for each in told["best"]] == sorted(
@@ -72,7 +81,7 @@ def test_search_leaves_tables_and_legs(tmp_path: Path, capsys: pytest.CaptureFix
 
     # Once more: nothing is searched, and the same is written.
     before = (out / "best.json").read_bytes()
-    assert main(["design", source, "--out", str(out)]) == 0
+    assert main(["design", source, "--out", str(out), "--tolerance", "0", "--simulate", "0"]) == 0
     assert "mine: finished before" in capsys.readouterr().out
     assert (out / "best.json").read_bytes() == before
 
@@ -85,7 +94,9 @@ def test_front_that_cannot_be_certified_fails(
     text = text.replace("radii = [0.01, 0.008]", "ramp = 0.0\nradii = [0.001, 0.03]")
     out = tmp_path / "out"
     assert main(["design", write(tmp_path, text), "--out", str(out)]) == 1
-    assert "motion.swing: reach is certain to -" in capsys.readouterr().out
+    shown = capsys.readouterr().out
+    assert "Take this one" not in (out / "report.html").read_text(encoding="utf-8")
+    assert "motion.swing: reach is certain to -" in shown
     assert list((out / "best").glob("*.toml")) == []
 
 
@@ -108,6 +119,22 @@ def test_refusal_is_one_line(
     assert main(["design", source, "--out", str(tmp_path / "out")]) == 2
     (line,) = capsys.readouterr().err.splitlines()
     assert message in line
+
+
+@pytest.mark.parametrize(
+    ("option", "message"),
+    [
+        (["--simulate", "-1"], "--simulate must be 0 or more, got -1"),
+        (["--tolerance", "-0.1"], "--tolerance must be in [0, inf) mm, got -0.1"),
+        (["--ray", "nowhere"], "--ray takes HOST:PORT of a Ray cluster, got 'nowhere'"),
+    ],
+)
+def test_option_out_of_range_is_one_line(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], option: list[str], message: str
+) -> None:
+    assert main(["design", write(tmp_path), "--out", str(tmp_path / "out"), *option]) == 2
+    assert capsys.readouterr().err == f"fivebar: {message}\n"
+    assert not (tmp_path / "out").exists()
 
 
 def test_best_are_spread_over_the_front() -> None:

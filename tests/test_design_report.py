@@ -20,8 +20,8 @@ from fivebar_sim.design.proof.simulate import Simulated
 from fivebar_sim.design.proof.table import Proof
 from fivebar_sim.design.report.axes import Axis, amount
 from fivebar_sim.design.report.legs import thinned
-from fivebar_sim.design.report.page import Built, Study
 from fivebar_sim.design.report.script import SCRIPT
+from fivebar_sim.design.report.study import Built, Study, to_simulate
 from fivebar_sim.design.report.write import write
 from fivebar_sim.design.robust.sensitivity import Sensitivity
 from fivebar_sim.design.robust.tolerance import Yield
@@ -68,6 +68,19 @@ def test_every_design_is_in_every_picture(study: Study, page: Page) -> None:
     rows = [e for e in page.all("tr") if "data-k" in e.attributes]
     assert [e.attributes["data-k"] for e in rows] == ["0", "1"]
     assert all(preset in "".join(e.text) for e, preset in zip(rows, study.presets, strict=True))
+
+
+def test_simulated_are_the_best_then_others_of_the_front(study: Study) -> None:
+    task = study.task
+    found = study.front
+    best = study.best
+    assert (to_simulate(task, found, best, 1) == best[:1]).all()
+    some = to_simulate(task, found, best, 9)
+    assert (some[:2] == best).all()
+    assert len(np.unique(some, axis=0)) == 9
+    every = to_simulate(task, found, best, 10_000)
+    assert len(np.unique(every, axis=0)) == len(every) == len(found.rows)
+    assert to_simulate(task, found, best[:0], 0).shape == (0, 2)
 
 
 def test_page_is_its_own_and_runs_its_own_script_only(page: Page) -> None:

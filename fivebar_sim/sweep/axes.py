@@ -124,6 +124,7 @@ def _split(text: str) -> list[str]:
     parts = [""]
     depth = 0
     quote = ""
+
     for letter in text:
         if quote:
             quote = "" if letter == quote else quote

@@ -142,6 +142,7 @@ def _draw(ax: Axes, shown: Shown) -> None:
         _lines(ax, first, shown.over[0], shown.value)
     else:
         _map(ax, shown)
+
     _label(ax.xaxis, first)
     if not ax.get_ylabel():
         ax.set_ylabel(shown.label)

@@ -151,6 +151,7 @@ class Store:
         if not isinstance(there, dict) or tables.is_deep(there):
             return f"its {STUDY} is damaged"
         names = {"vary": "its --vary", "sample": "its --sample", "seed": "its --seed"}
+
         for key, value in self._depends.items():
             if there.get(key) == value:
                 continue

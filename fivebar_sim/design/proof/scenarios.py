@@ -62,6 +62,7 @@ def _case(task: Task, row: Array, motion: FootMotion) -> Case:
     period = motion.path.period
     duration = last if period is None else last + SETTLING * period
     steps = max(FEWEST, round(seconds / TIMESTEP))
+
     loaded = motion.force is not None or motion.payload > 0.0
     scenario = Scenario(
         name=f"{task.name}-{motion.name}",

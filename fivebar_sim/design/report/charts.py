@@ -42,6 +42,7 @@ def scatter(
         high = min(x.high / x.scale, y.high / y.scale)
         (a, b), (c, d) = (_place(x, y, v, v) for v in (low, high))
         parts.append(f'<path class="equal" d="M{a:.1f} {b:.1f}L{c:.1f} {d:.1f}"/>')
+
     for k, px, py, kind, words in points:
         if np.isfinite(px) and np.isfinite(py):
             cx, cy = _place(x, y, px, py)
@@ -105,6 +106,7 @@ def _frame(x: Axis, y: Axis) -> Iterable[str]:
         across = LEFT + (right - LEFT) * part
         yield f'<path class="grid" d="M{across:.1f} {TOP}V{low}"/>'
         yield f'<text class="tick" x="{across:.1f}" y="{low + 17}">{text}</text>'
+
     for part, text in y.ticks():
         down = TOP + (low - TOP) * (1.0 - part)
         yield f'<path class="grid" d="M{LEFT} {down:.1f}H{right}"/>'

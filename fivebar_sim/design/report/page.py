@@ -14,9 +14,8 @@ from fivebar_sim.design.proof.table import Proof
 from fivebar_sim.design.report import charts, legs
 from fivebar_sim.design.report.axes import Axis, amount
 from fivebar_sim.design.report.script import SCRIPT, STYLE
+from fivebar_sim.design.report.study import Study
 from fivebar_sim.design.robust.sensitivity import Sensitivity
-from fivebar_sim.design.robust.tolerance import Yield
-from fivebar_sim.design.search.front import Front
 from fivebar_sim.design.task.task import Task
 from fivebar_sim.report import html
 from fivebar_sim.report.html import Cell, text
@@ -27,44 +26,6 @@ MOST = 60
 
 STANDS_OUT = 1.25
 """How many times as much as any other a dimension must be to blame, to be named."""
-
-
-class Built(NamedTuple):
-    """What becomes of a best design when it is built.
-
-    Attributes:
-        within: How far each dimension is off [m].
-        made: The share of legs that keep to the constraints.
-        sensitivities: By objective; empty where they were not asked for.
-        why: Why there are none, in words; "" if there are.
-    """
-
-    within: float
-    made: Yield
-    sensitivities: list[Sensitivity]
-    why: str = ""
-
-
-class Study(NamedTuple):
-    """All that the page tells.
-
-    Attributes:
-        task: The task.
-        front: The front.
-        best: The best designs, (n, d); the first is the one to take.
-        presets: Where each of them is as a preset, relative to the page.
-        sure: What is certain of each, in words.
-        built: What becomes of each when it is built; empty if it was not asked.
-        proof: The best in MuJoCo; None if they were not simulated.
-    """
-
-    task: Task
-    front: Front
-    best: Array
-    presets: list[str]
-    sure: list[str]
-    built: list[Built]
-    proof: Proof | None
 
 
 class Shown(NamedTuple):
@@ -95,6 +56,7 @@ def page(study: Study) -> str:
         html.section("Every number of each", _parallel(study.task, shown)),
         html.section("The best", _best(study, shown)),
     ]
+
     if study.built:
         parts.append(_robust(study))
     if study.proof is not None:
@@ -124,6 +86,7 @@ def _take(study: Study) -> list[str]:
     ]
     if not study.presets:
         return said
+
     preset = study.presets[0]
     code = html.escape(study.task.preset(study.best[0]))
     said += [
@@ -233,6 +196,7 @@ def _robust(study: Study) -> str:
         f"<p>Of legs like <code>{text(study.presets[0])}</code> whose lengths and holes are off by "
         f"up to {off}, {100.0 * made.share:.1f} % keep to every constraint.</p>"
     ]
+
     if made.broken:
         broken = ", ".join(f"{name} in {100.0 * part:.1f} %" for name, part in made.broken.items())
         said.append(f"<p>What breaks: {text(broken)}.</p>")
@@ -281,7 +245,8 @@ def _proof(proof: Proof) -> str:
         both = np.concatenate([proof.predicted[key], measured])
         rank = proof.rank[key]
         worst = proof.worst.get(key, float("nan"))
-        rows.append([key, f"{rank:.4f}", f"{100.0 * worst:.2g} %"])
+        rank_text = f"{rank:.4f}" if np.isfinite(rank) else "none"
+        rows.append([key, rank_text, f"{100.0 * worst:.2g} %"])
         x = Axis.of(f"{key}, predicted", unit, both)
         y = Axis.of(f"{key}, simulated", unit, both)
         points = [

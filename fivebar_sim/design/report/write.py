@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from fivebar_sim.design.report.page import Study, page
+from fivebar_sim.design.report.page import page
+from fivebar_sim.design.report.study import Study
 from fivebar_sim.files import whole_file
 
 REPORT = "report.html"
