@@ -29,7 +29,7 @@ LEVELS = (
     "walking",
     "runs environment gym",
     "page rollout report vector",
-    "regression sweep",
+    "regression sb3 sweep",
     "design",
     "cli pytest_plugin",
     "fivebar_sim __main__",
