@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -55,6 +56,27 @@ def walk(planned: RobotPlan, watch: Watch | None = None) -> Walk:
     """
     states = simulate(planned.model, planned.start[None], planned.setpoints[None], watch=watch)
     return of_states(planned, states)
+
+
+def walk_all(plans: Sequence[RobotPlan], nthread: int = 1) -> list[Walk]:
+    """Return what robots do, simulated together: of one structure, timestep and duration.
+
+    Args:
+        plans: The plans.
+        nthread: Threads; 0 is one for every processor.
+
+    Raises:
+        DivergedError: A simulation broke down; says which, and when.
+    """
+    states = simulate(
+        [planned.model for planned in plans],
+        np.stack([planned.start for planned in plans]),
+        np.stack([planned.setpoints for planned in plans]),
+        nthread,
+    )
+    return [
+        of_states(planned, states.rows(slice(row, row + 1))) for row, planned in enumerate(plans)
+    ]
 
 
 def of_states(planned: RobotPlan, states: States) -> Walk:

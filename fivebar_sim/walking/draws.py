@@ -1,0 +1,97 @@
+"""A robot's scenario again and again, with what nobody knows exactly drawn at random."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import msgspec
+import numpy as np
+
+from fivebar_sim.robots import Floor
+from fivebar_sim.robots.measure import Gone, measure
+from fivebar_sim.robots.scenario import RobotScenario
+from fivebar_sim.walking.plan import plan_scenario
+from fivebar_sim.walking.walk import walk_all
+
+TOGETHER = 16
+"""Robots that are simulated at one time: 2000 steps of each are some 20 MB."""
+
+
+class Ranges(NamedTuple):
+    """Ends of what is drawn, evenly.
+
+    Attributes:
+        friction: Coulomb's coefficient between feet and floor.
+        mass: Factor of the robot's mass; what is more or less is the trunk's.
+        delay: Added to the servos' delay [s].
+    """
+
+    friction: tuple[float, float] = (0.5, 1.2)
+    mass: tuple[float, float] = (0.9, 1.1)
+    delay: tuple[float, float] = (-1e-3, 1e-3)
+
+
+class Outcome(NamedTuple):
+    """What came of one draw.
+
+    Attributes:
+        friction: Coulomb's coefficient.
+        mass: Mass of the robot [kg].
+        delay: Delay of its servos [s].
+        moved: How it moved; its falls among it.
+    """
+
+    friction: float
+    mass: float
+    delay: float
+    moved: Gone
+
+
+def draw(
+    scenario: RobotScenario, count: int, seed: int, ranges: Ranges | None = None
+) -> list[RobotScenario]:
+    """Return a scenario with friction, mass and delay drawn at random.
+
+    Args:
+        scenario: The scenario; on a floor.
+        count: How many.
+        seed: Seed of the draws: the first ones of a longer list are those of a shorter one.
+        ranges: What is drawn; None: the defaults.
+    """
+    ends = np.array(Ranges() if ranges is None else ranges)
+    drawn = np.random.default_rng(seed).uniform(ends[:, 0], ends[:, 1], (count, len(ends)))
+    return [_with(scenario, *row) for row in drawn.tolist()]
+
+
+def _with(scenario: RobotScenario, friction: float, mass: float, delay: float) -> RobotScenario:
+    """Return a scenario with another friction, mass and delay."""
+    servo = msgspec.structs.replace(scenario.servo, delay=max(scenario.servo.delay + delay, 0.0))
+    robot = msgspec.structs.replace(scenario.robot, mass=mass * scenario.robot.mass, servo=servo)
+    return msgspec.structs.replace(
+        scenario, robot=robot, servo=servo, scene=Floor(friction=friction)
+    )
+
+
+def outcomes(scenarios: Sequence[RobotScenario], nthread: int = 1) -> list[Outcome]:
+    """Return what comes of scenarios of one duration, on floors.
+
+    Args:
+        scenarios: The scenarios.
+        nthread: Threads; 0 is one for every processor.
+
+    Raises:
+        DivergedError: A simulation broke down; says which, and when.
+    """
+    found = []
+    for start in range(0, len(scenarios), TOGETHER):
+        plans = [plan_scenario(each) for each in scenarios[start : start + TOGETHER]]
+        for went in walk_all(plans, nthread):
+            assert went.trunk is not None
+            planned = went.plan
+            moved = measure(went.trunk, planned.window, planned.robot.length, len(went.falls))
+            scene = planned.scene
+            friction = scene.friction if isinstance(scene, Floor) else 0.0
+            servo = planned.scenario.servo
+            found.append(Outcome(friction, planned.robot.mass, servo.delay, moved))
+    return found
