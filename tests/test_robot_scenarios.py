@@ -218,7 +218,6 @@ def test_own_file_has_its_robot_beside_it(tmp_path: Path) -> None:
         ("gait.phases.RL=0.0", r"gait\.phases\.FR is missing"),
         ("gait.phases=trot", r"gait\.phases must all be 0: the path does not repeat"),
         ("gait.stride=2", r"\[gait\]: unknown key 'stride'"),
-        ("controller.name=impedance", "a robot's controller must plan setpoints"),
         ("limits.robot.sped=1", r"\[limits\]: unknown key 'robot\.sped'; .*'robot\.speed'"),
         ("scene=air", r"limits\.robot\.falls needs a floor"),
         ("duration=0.01", "duration must be"),

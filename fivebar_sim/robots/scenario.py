@@ -9,7 +9,7 @@ from typing import Any
 import msgspec
 
 from fivebar_sim import units
-from fivebar_sim.control import Setpoints
+from fivebar_sim.control.sensors import Sensors
 from fivebar_sim.errors import ArgumentError, ConfigError, unknown
 from fivebar_sim.files import presets, tables
 from fivebar_sim.files.tables import Table
@@ -24,7 +24,7 @@ from fivebar_sim.scenario.scenario import check_window
 
 KEYS = (
     *("name", "robot", "scene", "duration", "path", "gait", "controller"),
-    *("sim", "guards", "limits", "converge"),
+    *("sensors", "sim", "guards", "limits", "converge"),
 )
 
 TRUNK_KEYS = tuple(metric.key for metric in ROBOTS)
@@ -70,17 +70,12 @@ class RobotScenario(Scenario, frozen=True, kw_only=True):
         tables.check_finite(table, where)
         name, duration = reading.name_and_duration(table, where)
         controller_name, controller = reading.controller(table.get("controller", {}), where)
-        if not isinstance(controller, Setpoints):
-            raise ConfigError(
-                f"{where}: controller.name: a robot's controller must plan setpoints, got "
-                f"{controller_name!r}, which answers what it observes"
-            )
-
         robot = read_robot(table["robot"], where, folder)
         path = reading.path(table.get("path"), where, folder)
         gait = table.get("gait", {})
         phases, strides = _gait(gait, where)
         scene = _scene(table.get("scene", "floor"), where)
+
         scenario = cls(
             name=name,
             robot=robot,
@@ -93,11 +88,13 @@ class RobotScenario(Scenario, frozen=True, kw_only=True):
             controller_name=controller_name,
             scene=scene,
             duration=duration,
+            sensors=tables.convert(table.get("sensors", {}), Sensors, "sensors", where),
             sim=reading.sim(table.get("sim", {}), scene, where),
             guards=tables.convert(table.get("guards", {}), Guards, "guards", where),
             limits=tables.bounds(table.get("limits", {}), ROBOT_KEYS, "limits", where),
             converge=reading.converge(table.get("converge", {}), where, ROBOT_KEYS),
         )
+        # Last: it compares the tables with each other, each of which is legal by now.
         _check_together(scenario, where)
         return scenario
 
@@ -108,7 +105,7 @@ class RobotScenario(Scenario, frozen=True, kw_only=True):
         """
         table = super().table()
         # They are the robot's.
-        for key in ("leg", "servo", "sensors"):
+        for key in ("leg", "servo"):
             table.pop(key)
         changed = msgspec.structs.replace(self.robot, servo=self.servo)
         gait = {"phases": self.phases, "strides": self.strides or dict.fromkeys(LEGS, 1.0)}

@@ -83,7 +83,8 @@ def outcomes(scenarios: Sequence[RobotScenario], nthread: int = 1) -> list[Outco
     Raises:
         DivergedError: A simulation broke down; says which, and when.
     """
-    found = []
+    found: list[Outcome] = []
+
     for start in range(0, len(scenarios), TOGETHER):
         plans = [plan_scenario(each) for each in scenarios[start : start + TOGETHER]]
         for went in walk_all(plans, nthread):
@@ -91,6 +92,7 @@ def outcomes(scenarios: Sequence[RobotScenario], nthread: int = 1) -> list[Outco
             planned = went.plan
             moved = measure(went.trunk, planned.window, planned.robot.length, len(went.falls))
             scene = planned.scene
+            # Of the draw, as it was run.
             friction = scene.friction if isinstance(scene, Floor) else 0.0
             servo = planned.scenario.servo
             found.append(Outcome(friction, planned.robot.mass, servo.delay, moved))

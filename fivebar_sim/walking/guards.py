@@ -24,7 +24,7 @@ from fivebar_sim.walking.walk import Walk
 OF_ROBOT = ("energy", "constraints", "step", "solver")
 """Guards that look at the whole robot."""
 
-OF_LEGS = ("branch", "loop", "torque", "chatter", "stops", "heat", "jolts")
+OF_LEGS = ("branch", "loop", "torque", "chatter", "stops", "heat", "feedback", "jolts")
 """Guards that look at one leg."""
 
 
@@ -104,8 +104,16 @@ def _evidence(went: Walk, k: int, leg: Seen, balance: Balance) -> Evidence:
         ranges=recorded.ranges(planned.model, f"{leg.name}_"),
         trunk=0.0,
         heating=leg.heated,
+        growth=recorded.growth(planned.legs[k], _grounded(went, leg)),
         jolts=recorded.jolts(planned.legs[k], leg.record),
     )
+
+
+def _grounded(went: Walk, leg: Seen) -> Record:
+    """Return a leg's record with the floor's force on its foot, if there is a floor."""
+    if went.trunk is None:
+        return leg.record
+    return {**leg.record, "ground_z": went.record[f"{leg.name}_ground_z"]}
 
 
 def _on_floor(went: Walk, legs: list[Seen], run: Evidence) -> dict[str, Found]:

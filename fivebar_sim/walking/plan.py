@@ -11,7 +11,7 @@ import numpy as np
 from fivebar_sim import control, model, motion
 from fivebar_sim.arrays import Array
 from fivebar_sim.checks import check_number
-from fivebar_sim.control import Setpoints, name_of
+from fivebar_sim.control import Feedback, Setpoints, name_of
 from fivebar_sim.errors import ConfigError, SingularError, UnreachableError
 from fivebar_sim.integrator import Sim
 from fivebar_sim.model.robot import standing_height
@@ -20,7 +20,7 @@ from fivebar_sim.paths import FootPath
 from fivebar_sim.robots import LEGS, Floor, Gait, Robot, Scene
 from fivebar_sim.robots.scenario import RobotScenario
 from fivebar_sim.scenario import Scenario
-from fivebar_sim.simulation.plan import Plan, asked_setpoints, sent_setpoints
+from fivebar_sim.simulation.plan import Plan, asked_setpoints, check_period, sent_setpoints
 
 
 class RobotPlan(NamedTuple):
@@ -32,14 +32,15 @@ class RobotPlan(NamedTuple):
             the robot's model.
         model: The compiled MuJoCo model.
         start: qpos at t = 0: level, at rest, the lowest foot on the floor.
-        setpoints: What reaches the motors in every step [rad], (N, 8).
+        setpoints: What reaches the motors in every step [rad], (N, 8); None where a feedback
+            controller decides during the run.
     """
 
     scenario: RobotScenario
     legs: tuple[Plan, ...]
     model: mujoco.MjModel
     start: Array
-    setpoints: Array
+    setpoints: Array | None
 
     @property
     def robot(self) -> Robot:
@@ -72,7 +73,7 @@ def plan(
     gait: Gait,
     *,
     duration: float = 4.0,
-    controller: Setpoints | None = None,
+    controller: Setpoints | Feedback | None = None,
     scene: Scene | None = None,
     sim: Sim | None = None,
 ) -> RobotPlan:
@@ -82,8 +83,9 @@ def plan(
         robot: The robot.
         gait: What its feet do.
         duration: Length of the run [s].
-        controller: Plans the setpoints of each leg from its motion, as in a scenario; None: the
-            angles of the path, the shipped controller "servo" with its defaults.
+        controller: Drives each leg, as in a leg's scenario: plans its setpoints, or is asked at
+            every control step. None: the angles of the path, the shipped controller "servo" with
+            its defaults.
         scene: What the robot stands on; None: a floor with its defaults.
         sim: Timestep, integrator, seed; None: the defaults.
 
@@ -95,7 +97,7 @@ def plan(
         GeometryError: Legs that cannot stand.
     """
     _check_duration(gait, duration)
-    law: Setpoints = control.find("servo")() if controller is None else controller
+    law: Setpoints | Feedback = control.find("servo")() if controller is None else controller
 
     return plan_scenario(
         RobotScenario(
@@ -121,7 +123,11 @@ def plan_scenario(scenario: RobotScenario) -> RobotPlan:
     sim = scenario.sim
     # First: a robot that cannot stand is refused before any of its legs is planned.
     built = model.build_robot(
-        robot, scenario.scene, timestep=sim.timestep, integrator=sim.integrator
+        robot,
+        scenario.scene,
+        timestep=sim.timestep,
+        integrator=sim.integrator,
+        drive=getattr(scenario.controller, "drive", "position"),
     )
     paths = scenario.gait.paths(robot)
     legs = tuple(_of_leg(scenario, paths[leg], leg, built) for leg in LEGS)
@@ -131,13 +137,13 @@ def plan_scenario(scenario: RobotScenario) -> RobotPlan:
         start = np.concatenate([[0.0, 0.0, height, 1.0, 0.0, 0.0, 0.0], start])
 
     sent = [leg.setpoints for leg in legs if leg.setpoints is not None]
-    return RobotPlan(scenario, legs, built, start, np.concatenate(sent, axis=1))
+    table = np.concatenate(sent, axis=1) if sent else None
+    return RobotPlan(scenario, legs, built, start, table)
 
 
 def _of_leg(scenario: RobotScenario, path: FootPath, leg: str, built: mujoco.MjModel) -> Plan:
     """Return the plan of one leg."""
     controller = scenario.controller
-    assert isinstance(controller, Setpoints)
     # A leg is planned as it is alone: nothing of what a step does is written twice.
     alone = Scenario(
         name=f"{scenario.name} {leg}",
@@ -146,17 +152,30 @@ def _of_leg(scenario: RobotScenario, path: FootPath, leg: str, built: mujoco.MjM
         controller=controller,
         controller_name=scenario.controller_name,
         servo=scenario.servo,
+        sensors=scenario.sensors,
         duration=scenario.duration,
-        sim=scenario.sim,
+        sim=_seeded(scenario.sim, leg),
     )
 
     try:
         wanted = motion.plan(alone.leg, path, alone.steps, alone.sim.timestep)
+        start = wanted.q[0]
+        pushes = np.empty((alone.steps, 0))
+        if isinstance(controller, Feedback):
+            planned = Plan(alone, wanted, built, start, pushes, None, None)
+            # Now, not during the run.
+            check_period(planned)
+            return planned
         asked = asked_setpoints(alone, controller, wanted)
     except (UnreachableError, SingularError) as error:
         raise type(error)(f"{leg}: {error}", error.index) from None
     sent = sent_setpoints(alone, asked, wanted)
-    return Plan(alone, wanted, built, wanted.q[0], np.empty((alone.steps, 0)), sent, asked)
+    return Plan(alone, wanted, built, start, pushes, sent, asked)
+
+
+def _seeded(sim: Sim, leg: str) -> Sim:
+    """Return the table [sim] of one leg: the noise of its sensors is its own."""
+    return msgspec.structs.replace(sim, seed=len(LEGS) * sim.seed + LEGS.index(leg))
 
 
 def _check_duration(gait: Gait, duration: float) -> None:

@@ -17,6 +17,7 @@ from fivebar_sim.simulation import record as recorded
 from fivebar_sim.simulation.record import Part
 from fivebar_sim.simulation.steps import States, Watch, check_states, simulate
 from fivebar_sim.walking.plan import RobotPlan
+from fivebar_sim.walking.steer import steered
 
 
 class Walk(NamedTuple):
@@ -54,6 +55,8 @@ def walk(planned: RobotPlan, watch: Watch | None = None) -> Walk:
     Raises:
         DivergedError: The simulation broke down; says when.
     """
+    if planned.setpoints is None:
+        return of_states(planned, steered(planned))
     states = simulate(planned.model, planned.start[None], planned.setpoints[None], watch=watch)
     return of_states(planned, states)
 
@@ -68,10 +71,14 @@ def walk_all(plans: Sequence[RobotPlan], nthread: int = 1) -> list[Walk]:
     Raises:
         DivergedError: A simulation broke down; says which, and when.
     """
+    tables = [planned.setpoints for planned in plans if planned.setpoints is not None]
+    if len(tables) < len(plans):
+        return [walk(planned) for planned in plans]
+
     states = simulate(
         [planned.model for planned in plans],
         np.stack([planned.start for planned in plans]),
-        np.stack([planned.setpoints for planned in plans]),
+        np.stack(tables),
         nthread,
     )
     return [
