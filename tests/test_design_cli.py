@@ -45,6 +45,17 @@ def write(folder: Path, text: str = TASK) -> str:
     return str(path)
 
 
+def expect_simulated_and_drawn(out: Path) -> None:
+    """One design is on the front, and one alone has no rank."""
+    simulated = pq.read_table(out / "simulated.parquet").to_pylist()
+    assert [row["design"] for row in simulated] == [0]
+
+    page = (out / "report.html").read_text(encoding="utf-8")
+    assert "best/mine-01.toml" in page
+    assert "1 designs in MuJoCo" in page
+    assert not (out / "built.json").exists()
+
+
 def test_search_leaves_tables_and_legs(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     source = write(tmp_path)
     out = tmp_path / "out"
@@ -57,14 +68,9 @@ def test_search_leaves_tables_and_legs(tmp_path: Path, capsys: pytest.CaptureFix
     table = pq.read_table(out / "designs.parquet")
     assert table.num_rows == 36
     assert table.column_names == [*(each.name for each in design.columns(task)), "feasible"]
-    # One design has no rank.
     assert "rank correlation" not in shown
-    simulated = pq.read_table(out / "simulated.parquet").to_pylist()
-    assert [row["design"] for row in simulated] == [0]
-    page = (out / "report.html").read_text(encoding="utf-8")
-    assert "best/mine-01.toml" in page
-    assert "1 designs in MuJoCo" in page
-    assert not (out / "built.json").exists()
+    expect_simulated_and_drawn(out)
+
     front = pq.read_table(out / "front.parquet")
     told = json.loads((out / "best.json").read_text(encoding="utf-8"))
     assert [Path(each["file"]).name for each in told["best"]] == sorted(
