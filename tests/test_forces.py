@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import math
-import subprocess
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -95,18 +93,13 @@ def test_constant_force_is_constant() -> None:
     assert Constant(value=(0.5, -2.0)).end == math.inf
 
 
-def test_kinds_decode_by_name_without_anything_heavy() -> None:
+def test_kinds_decode_by_name() -> None:
     assert sorted(KINDS) == ["constant", "csv", "stance"]
     for force in (Constant(value=(1.0, 2.0)), Stance(peak=(1.0, 2.0)), Csv(file="a.csv")):
         table = msgspec.to_builtins(force)
         assert KINDS[table["kind"]] is type(force)
         assert msgspec.convert(table, ForceSpec) == force
     assert Constant(value=(1.0, 2.0)).resolve(Path()) == Constant(value=(1.0, 2.0))
-    heavy = (
-        "import sys, fivebar_sim.scenario.forces; "
-        "sys.exit(bool({'scipy', 'mujoco'} & {*sys.modules}))"
-    )
-    assert subprocess.run([sys.executable, "-c", heavy], check=False).returncode == 0
 
 
 # refusal
