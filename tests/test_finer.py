@@ -11,8 +11,11 @@ from fivebar_sim.rollout import Result
 PASSING = 300
 """Runs that the long form looks at."""
 
-QUICK = (4, 19, 358, 368, 390, 419)
-"""Seeds of passing runs that say nothing: of every scene, both integrators, feedback, friction."""
+FIRST = 5000
+"""Seed of the first of them: bounds and guards were chosen with smaller ones in sight."""
+
+QUICK = (5040, 5128, 5181, 5228, 5264, 5349)
+"""Seeds of passing runs that say nothing: of most scenes, both integrators, feedback, friction."""
 
 JUMPING = (5, 100, 330)
 """Seeds of runs with commands that jump, and that passed before there was a guard."""
@@ -51,15 +54,10 @@ def test_runs_that_were_wrong_and_said_nothing_fail(seed: int) -> None:
 
 @pytest.mark.long
 def test_passing_runs_are_right_or_say_so() -> None:
-    """300 passing runs, of about 540: the others are refused, break down, or trip a guard.
-
-    Of those that say nothing none fails at a quarter of its timestep; one in a hundred may be off
-    by up to a tenth. The bounds were chosen with these seeds in sight, so this holds them where
-    they are: of 129 passing runs with other seeds one was off by 38 % without a word (1132).
-    """
+    """300 passing runs, of about 550: the others are refused, break down, or trip a guard."""
     wrong = {}
     looked = 0
-    seed = 0
+    seed = FIRST
     while looked < PASSING:
         result = passing(seed)
         if result is not None:
@@ -68,8 +66,4 @@ def test_passing_runs_are_right_or_say_so() -> None:
             if found is not None:
                 wrong[seed] = found
         seed += 1
-    assert [(seed, found.failed) for seed, found in wrong.items() if found.failed] == []
-    assert [
-        (seed, found.off) for seed, found in wrong.items() if max(found.off.values()) > 0.1
-    ] == []
-    assert len(wrong) <= PASSING // 100, wrong
+    assert wrong == {}
