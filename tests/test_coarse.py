@@ -117,6 +117,16 @@ def test_run_that_breaks_down_in_shorter_steps_says_so() -> None:
     assert warning.startswith(said)
 
 
+def test_feedback_that_a_standing_foot_hides_from_its_guard_is_said() -> None:
+    """Poses in stance count as neither stable nor unstable: this spring has no damper."""
+    settings = ["servo={}", "controller={name='pd',kp=5.0,kd=0.0,period=0.002}"]
+    result = ran("q8bot-squat", *settings)
+    (guard,) = [each for each in result.measured.guards if each.name == "feedback"]
+    assert guard.ok
+    (warning,) = owed(result)
+    assert warning.startswith("the timestep is too long: at half of it the run ends: q8bot-squat")
+
+
 def test_limit_that_breaks_in_shorter_steps_is_named() -> None:
     name, settings, *_ = CASES[1]
     limited = [*settings, "limits.load.torque_peak.A=1.6", "limits.load.torque_rms.A=9.0"]
