@@ -112,6 +112,13 @@ def test_other_peoples_files_are_left_alone(foreign: str, tmp_path: Path) -> Non
     assert [path.name for path in tmp_path.iterdir()] == ["out"]
 
 
+def test_the_current_folder_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(ConfigError, match="it is the current folder; give one within it"):
+        export.write(FiveBar.load("classic"), ".")
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_a_file_in_the_place_is_refused(tmp_path: Path) -> None:
     (tmp_path / "out").write_text("mine\n")
     with pytest.raises(ConfigError, match="not a directory"):

@@ -85,6 +85,9 @@ def check_free(place: Path, ours: set[str]) -> None:
         return
     if place.is_symlink() or not place.is_dir():
         raise ConfigError(f"cannot write {place}: something that is not a directory is there")
+    # An earlier export is replaced by renaming, which the folder of this very process cannot be.
+    if place.resolve() == Path.cwd():
+        raise ConfigError(f"cannot write {place}: it is the current folder; give one within it")
     there = {path.relative_to(place).as_posix() for path in place.rglob("*") if not _is_dir(path)}
     foreign = sorted(there - ours)
     if foreign:
