@@ -79,20 +79,27 @@ def _hosted(compiler: str, link: Sequence[str], runner: Sequence[str]) -> Target
     return Target((compiler, *runner), build)
 
 
-def _cortex(to: Path, flags: Sequence[str]) -> list[str]:
-    """Build for the Cortex-M4F; Linux's C library for ARM stands in for a board."""
-    flags = [*flags, *M4F]
-    parts = [
-        compile_leg("arm-none-eabi-gcc", to, flags),
-        compile_bits("arm-none-eabi-gcc", to, flags),
-    ]
-    for part in parts:
-        # The linker refuses to join the M and A profiles, whose calling convention is the same.
-        run("arm-none-eabi-objcopy", "--remove-section", ".ARM.attributes", part)
-    program = to / "bits"
-    link = ("-static", "-Wl,-z,noexecstack")
-    run("arm-linux-gnueabihf-gcc", *link, HERE / "main.c", *parts, "-o", program)
-    return ["qemu-arm", str(program)]
+def _cortex(*processor: str) -> Target:
+    """Return a microcontroller; Linux's C library for ARM stands in for a board."""
+
+    def build(to: Path, flags: Sequence[str]) -> list[str]:
+        flags = [*flags, *processor]
+        parts = [
+            compile_leg("arm-none-eabi-gcc", to, flags),
+            compile_bits("arm-none-eabi-gcc", to, flags),
+        ]
+        # Float arithmetic that the processor lacks comes from its own compiler's library.
+        library = run("arm-none-eabi-gcc", *processor, "-print-libgcc-file-name").strip()
+        joined = to / "joined.o"
+        run("arm-none-eabi-ld", "-r", *parts, library, "-o", joined)
+        # The linker refuses to join the M and A profiles; whole numbers are passed alike.
+        run("arm-none-eabi-objcopy", "--remove-section", ".ARM.attributes", joined)
+        program = to / "bits"
+        link = ("-static", "-Wl,-z,noexecstack")
+        run("arm-linux-gnueabihf-gcc", *link, HERE / "main.c", joined, "-o", program)
+        return ["qemu-arm", str(program)]
+
+    return Target(("arm-none-eabi-gcc", "arm-linux-gnueabihf-gcc", "qemu-arm"), build)
 
 
 def _wasm(to: Path, flags: Sequence[str]) -> list[str]:
@@ -107,10 +114,8 @@ def _wasm(to: Path, flags: Sequence[str]) -> list[str]:
 TARGETS = {
     "host": _hosted("cc", (), ()),
     "clang": _hosted("clang", (), ()),
-    "cortex-m4f": Target(
-        ("arm-none-eabi-gcc", "arm-linux-gnueabihf-gcc", "qemu-arm"),
-        _cortex,
-    ),
+    "cortex-m4f": _cortex(*M4F),
+    "cortex-m0": _cortex("-mcpu=cortex-m0", "-mthumb", "-mfloat-abi=soft"),
     "aarch64": _hosted("aarch64-linux-gnu-gcc", ("-static",), ("qemu-aarch64",)),
     "riscv64": _hosted("riscv64-linux-gnu-gcc", ("-static",), ("qemu-riscv64",)),
     "wasm": Target(("clang", "wasm-ld", "node"), _wasm),
