@@ -2,8 +2,8 @@
 
 const PAD = { left: 46, right: 10, top: 20, bottom: 8 };
 
-/** Draw one chart: two lines over the phase, a mark at the present one. */
-function chart(context, colours, box, { title, unit, values, rows, phase }) {
+/** Draw one chart: two lines over the phase. */
+function chart(context, colours, box, { title, unit, values, rows }) {
   const good = rows.filter((row) => row.ok).flatMap(values);
   const { x, y, width, height } = box;
   const left = x + PAD.left;
@@ -44,8 +44,6 @@ function chart(context, colours, box, { title, unit, values, rows, phase }) {
     context.lineJoin = "round";
     context.stroke();
   }
-  context.fillStyle = colours.ink;
-  context.fillRect(across(phase * rows.length) - 0.75, top, 1.5, bottom - top);
 }
 
 /** Return round ends for some values. */
@@ -62,33 +60,50 @@ function range(values) {
 
 const short = (value) => Number(value.toPrecision(3)).toString().replace("-", "\u2212");
 
-export function drawCharts(canvas, colours, path) {
-  const ratio = window.devicePixelRatio || 1;
-  const width = canvas.clientWidth;
-  const height = canvas.clientHeight;
-  canvas.width = width * ratio;
-  canvas.height = height * ratio;
-  const context = canvas.getContext("2d");
-  context.scale(ratio, ratio);
+const DEGREES = 180 / Math.PI;
+
+const WHAT = [
+  { title: "angles over the path", unit: "deg", values: (row) => row.theta.map((angle) => angle * DEGREES) },
+  { title: "torques over the path", unit: "N m", values: (row) => row.tau },
+];
+
+/** Both charts. They are drawn when the path, the leg or the force changes; while the path is played
+ * only the marks move. */
+export class Charts {
+  constructor(canvas) {
+    this.canvas = canvas;
+    this.marks = WHAT.map(() => canvas.parentElement.appendChild(document.createElement("i")));
+    this.key = "";
+  }
+
+  show(colours, path) {
+    const ratio = window.devicePixelRatio || 1;
+    const width = this.canvas.clientWidth;
+    const height = this.canvas.clientHeight;
+    const boxes = placed(width, height);
+    const key = [path.made, path.key, width, height, ratio, colours.key].join();
+    if (key !== this.key) {
+      this.key = key;
+      this.canvas.width = width * ratio;
+      this.canvas.height = height * ratio;
+      const context = this.canvas.getContext("2d");
+      context.scale(ratio, ratio);
+      WHAT.forEach((what, k) => chart(context, colours, boxes[k], { ...what, rows: path.rows }));
+    }
+    boxes.forEach((box, k) => {
+      const x = box.x + PAD.left + path.phase * (box.width - PAD.left - PAD.right);
+      this.marks[k].style.transform = `translate(${x}px, ${box.y + PAD.top}px)`;
+      this.marks[k].style.height = `${box.height - PAD.top - PAD.bottom}px`;
+    });
+  }
+}
+
+/** Return the boxes of the charts: side by side if there is room. */
+function placed(width, height) {
   const beside = width > 560;
-  const box = (k) =>
+  return [0, 1].map((k) =>
     beside
       ? { x: (k * width) / 2, y: 0, width: width / 2, height }
-      : { x: 0, y: (k * height) / 2, width, height: height / 2 };
-  const degrees = 180 / Math.PI;
-  const { rows, phase } = path;
-  chart(context, colours, box(0), {
-    title: "angles over the path",
-    unit: "deg",
-    values: (row) => row.theta.map((angle) => angle * degrees),
-    rows,
-    phase,
-  });
-  chart(context, colours, box(1), {
-    title: "torques over the path",
-    unit: "N m",
-    values: (row) => row.tau,
-    rows,
-    phase,
-  });
+      : { x: 0, y: (k * height) / 2, width, height: height / 2 },
+  );
 }

@@ -11,6 +11,7 @@ const PASSES = 3;
 
 export class Path {
   constructor() {
+    this.made = 0;
     this.clear();
   }
 
@@ -53,6 +54,7 @@ export class Path {
   set(points) {
     this.drawn = [];
     this.points = points;
+    this.made += 1;
     this.key = "";
     this.phase = 0;
   }
