@@ -97,6 +97,10 @@ def test_refusals(shell: Shell, tmp_path: Path) -> None:
     (tmp_path / "there.html").mkdir()
     message = shell.refused("page", "classic", "--out", "there.html")
     assert message == "cannot write there.html: a directory is there"
+    (tmp_path / "tiny.toml").write_text(
+        'scale = "any"\nL1 = 2e-5\nL2 = 2e-5\nL3 = 2e-5\nL4 = 2e-5\nL5 = 0.0\n'
+    )
+    assert "cannot hold the leg tiny" in shell.refused("page", "tiny.toml")
     (tmp_path / "bad.toml").write_text("L9 = 1.0\n")
     assert "unknown key 'L9'" in shell.refused("page", "bad.toml")
 

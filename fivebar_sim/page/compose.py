@@ -13,7 +13,7 @@ from typing import Any
 
 import tomli_w
 
-from fivebar_sim import kinematics
+from fivebar_sim import firmware, kinematics
 from fivebar_sim.errors import ConfigError
 from fivebar_sim.files import resources, whole_file
 from fivebar_sim.geometry import FiveBar, read_table
@@ -43,8 +43,11 @@ def page(source: str | Path) -> str:
 
     Raises:
         ConfigError: An unknown or wrong leg.
+        GeometryError: A leg that the firmware cannot hold, or without a pose on its branch.
     """
     leg = FiveBar.load(source)
+    # Raises where the page's arithmetic cannot hold the leg.
+    firmware.of(leg)
     # In JSON only "<" could end the script that holds it.
     begin = json.dumps(start(leg, source)).replace("<", "\\u003c")
     modules = {path.stem: path.read_text(encoding="utf-8") for path in HERE.glob("*.js")}
