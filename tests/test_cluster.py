@@ -5,6 +5,7 @@ from __future__ import annotations
 import operator
 import os
 import random
+import re
 import signal
 import socket
 import subprocess
@@ -200,14 +201,16 @@ def answers(address: str) -> bool:
 NODES = """
 import logging, ray, sys
 ray.init(address=sys.argv[1], log_to_driver=False, logging_level=logging.ERROR)
-print(int(ray.cluster_resources().get("CPU", 0)))
+print("nodes:", int(ray.cluster_resources().get("CPU", 0)))
 """
 
 
 def nodes(address: str) -> int:
     """Return how many nodes of one processor a cluster has."""
     run = subprocess.run([sys.executable, "-c", NODES, address], capture_output=True, text=True)
-    return int(run.stdout or 0)
+    # Ray may print the log of a lost node as well.
+    found = re.search(r"^nodes: (\d+)$", run.stdout, re.MULTILINE)
+    return int(found[1]) if found else 0
 
 
 @pytest.mark.long

@@ -23,6 +23,9 @@ if TYPE_CHECKING:
     from fivebar_sim.design.search.run import Progress as Searched
     from fivebar_sim.workers.here import Workers
 
+WIDEST = 1000
+"""Columns that the table of the best may take."""
+
 WORTH = 12
 """Simulated designs that are worth a process."""
 
@@ -171,7 +174,11 @@ def _print(
         console.print(Text(f"{task.name}: finished before, {front}"), soft_wrap=True)
 
     if chosen.best:
-        console.print(_table(task, chosen))
+        table = _table(task, chosen)
+        # As wide as its numbers, which would be cut on a terminal of few columns.
+        wide = console.options.update(max_width=WIDEST)
+        console.width = max(console.width, console.measure(table, options=wide).maximum)
+        console.print(table)
     if chosen.unknown:
         console.print(Text(f"not certified: {chosen.unknown}"), soft_wrap=True)
     if chosen.refused:
