@@ -19,7 +19,7 @@ from typing import Any
 
 from fivebar_sim.checks import check_number
 from fivebar_sim.errors import ConfigError, GeometryError, UnknownError, unknown
-from fivebar_sim.files import presets
+from fivebar_sim.files import presets, quantities
 from fivebar_sim.links import Link, ball, capsule, combined, moved, rod
 
 Mode = tuple[int, int]
@@ -246,6 +246,8 @@ class FiveBar:
     def from_table(cls, table: Mapping[str, Any], where: str) -> FiveBar:
         """Return the leg of a TOML table; `where` names the table in messages.
 
+        Numbers may be texts with a unit: "40 mm".
+
         Raises:
             ConfigError: An unknown key, or a value out of range.
         """
@@ -258,7 +260,7 @@ class FiveBar:
             values: dict[str, Any] = {
                 # TOML has only lists; a frozen leg must be hashable.
                 key: tuple(value) if isinstance(value, list) else value
-                for key, value in table.items()
+                for key, value in quantities.in_si(table, cls, "", where).items()
             }
             return cls(**values)
         except GeometryError as error:

@@ -243,6 +243,7 @@ class LegVectorEnv(VectorEnv[Array, Array, Any]):
         """Return the legs that a reset is for."""
         if "reset_mask" not in given:
             return np.arange(self.num_envs)
+
         mask = given["reset_mask"]
         fits = isinstance(mask, np.ndarray) and mask.dtype == np.bool_
         if not (fits and mask.shape == (self.num_envs,) and mask.any()):

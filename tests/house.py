@@ -13,8 +13,8 @@ PACKAGES = {"fivebar_sim": "fivebar_sim", "fivebar_controllers": "controllers/fi
 """The packages that ship, and where they lie."""
 
 LEVELS = (
-    "errors",
-    "arrays checks files units workers",
+    "errors units",
+    "arrays checks files workers",
     "links",
     "geometry integrator paths",
     "kinematics",

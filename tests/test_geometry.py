@@ -322,7 +322,7 @@ def test_masses_gravity_and_foot_are_checked(table: dict[str, Any], message: str
         ("l1 = 0.04", r"leg\.toml: unknown key 'l1'; known: L1, L2, "),
         ("densty = 1", r"leg\.toml: unknown key 'densty'; .* \(did you mean 'density'\?\)$"),
         ("L1 = 0", r"leg\.toml: L1 must be in \(0, 1000\) m, got 0$"),
-        ("L1 = '40 mm'", r"leg\.toml: L1 must be in \(0, 1000\) m, got '40 mm'$"),
+        ("L1 = 'forty'", r"leg\.toml: L1 must be in \(0, 1000\) m, got 'forty'$"),
         ("L1 = {}", r"leg\.toml: L1 must be in \(0, 1000\) m, got \{\}$"),
         ("L1 = ", r"leg\.toml: not TOML: Invalid value"),
         ("L1 = 1\nL1 = 2", r"leg\.toml: not TOML: "),

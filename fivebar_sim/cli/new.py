@@ -49,6 +49,8 @@ timestep = 0.001         # [s]
 # integrator = "discrete"  # or implicitfast
 # seed = 0
 
+# Numbers with a unit work too: L2 = "70 mm", delay = "2 ms", resolution = "0.09 deg".
+
 # [limits]               # `fivebar check` needs some: an upper bound, or [low, high], in SI
 # tracking.rms = 1.3e-3  # [m]
 # load.share_A = [0.4, 0.6]

@@ -169,6 +169,7 @@ def _overview() -> str:
     """Return the help of the program itself: a line for each command."""
     widest = max(len(name) for name in COMMANDS)
     lines = [f"  {name:{widest}}  {summary}" for name, summary in COMMANDS.items()]
+
     return "\n".join(
         [
             "usage: fivebar COMMAND [ARGUMENTS]",

@@ -12,7 +12,7 @@ from typing import Any, TypeVar, get_args, get_type_hints
 import msgspec
 
 from fivebar_sim.errors import ConfigError, UnknownError, unknown
-from fivebar_sim.files import input_file
+from fivebar_sim.files import input_file, quantities
 
 T = TypeVar("T")
 Table = dict[str, Any]
@@ -206,7 +206,7 @@ WORDS = {
 
 
 def convert(table: Any, kind: type[T], name: str, where: str) -> T:
-    """Return a table as a Struct of the given kind.
+    """Return a table as a Struct of the given kind; numbers may be texts with a unit, "40 mm".
 
     Args:
         table: What the file has under `name`.
@@ -220,6 +220,7 @@ def convert(table: Any, kind: type[T], name: str, where: str) -> T:
     if not isinstance(table, dict):
         raise ConfigError(f"{where}: {name} must be a table, got {table!r}")
     check_keys(table, keys(kind), f"{where}: [{name}]")
+    table = quantities.in_si(table, kind, name, where)
     try:
         return msgspec.convert(table, kind)
     except msgspec.ValidationError as error:

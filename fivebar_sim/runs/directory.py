@@ -11,18 +11,22 @@ import shutil
 import tempfile
 from collections.abc import Iterable, Mapping
 from pathlib import Path
+from typing import Any
 
 import tomli_w
 
 from fivebar_sim.arrays import Array
 from fivebar_sim.errors import RunDirectoryError
-from fivebar_sim.files import exchange, leftovers, whole_file
+from fivebar_sim.files import exchange, leftovers, quantities, whole_file
 from fivebar_sim.metrics.columns import digest
 from fivebar_sim.recording import rrd
 from fivebar_sim.runs import checksums, recorded
 from fivebar_sim.runs.kept import DIVERGED, FILES, keep, own_names
 
 RECORDING = "recording.rrd"
+
+TABLES = ("leg", "path", "force", "scene", "servo", "controller", "sensors", "sim")
+"""Tables of a scenario whose keys have units; each is an attribute of it."""
 
 GROUP = 100_000
 """Rows of a record that are encoded at once: 20 MB."""
@@ -162,10 +166,17 @@ def check_run(path: Path) -> None:
         raise RunDirectoryError(f"{path} is not a run directory: {what}")
 
 
+def _with_units(scenario: Any) -> str:
+    """Return a resolved scenario as TOML, with the units of its keys as comments."""
+    parts = {name: getattr(scenario, name, None) for name in TABLES}
+    kinds = {name: type(part) for name, part in parts.items() if part is not None}
+    return quantities.annotated(tomli_w.dumps(scenario.table()), kinds, {"duration": "s"})
+
+
 def _fill(stage: Path, result: rrd.Run) -> None:
     """Write the files of a run into an empty directory."""
     scenario = result.scenario
-    (stage / "scenario.toml").write_text(tomli_w.dumps(scenario.table()), encoding="utf-8")
+    (stage / "scenario.toml").write_text(_with_units(scenario), encoding="utf-8")
     for name, content in scenario.files.items():
         (stage / name).write_bytes(content)
     text = json.dumps(result.measured.table, indent=2, allow_nan=False)

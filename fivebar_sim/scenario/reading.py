@@ -15,7 +15,7 @@ from fivebar_sim.control import Feedback, Setpoints
 from fivebar_sim.control.servo import Servo
 from fivebar_sim.control.servo import read_table as read_servo
 from fivebar_sim.errors import ArgumentError, ConfigError, UnknownError, unknown
-from fivebar_sim.files import tables
+from fivebar_sim.files import quantities, tables
 from fivebar_sim.files.tables import Table
 from fivebar_sim.geometry import FiveBar
 from fivebar_sim.integrator import ON_BELT, ON_RAIL, Sim
@@ -90,7 +90,7 @@ def name_and_duration(table: Table, where: str) -> tuple[str, float]:
         raise ConfigError(
             f"{where}: name must be a plain file name of 1 to {LONGEST_NAME} bytes, got {name!r}"
         )
-    duration = table.get("duration", 4.0)
+    duration = quantities.quantity(table.get("duration", 4.0), "s", f"{where}: duration")
     try:
         check_number("duration", duration, "s", low=0.0, strict=True)
     except ArgumentError as error:
