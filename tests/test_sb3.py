@@ -52,7 +52,8 @@ def test_adapter_gives_what_the_legs_give() -> None:
     for _ in range(25):
         part = random.uniform(-1.0, 1.0, (3, 2)).astype(np.float32)
         seen, reward, over, infos = ours.step(part)
-        low, high = legs.episodes.low, legs.episodes.high
+        low = legs.episodes.low
+        high = legs.episodes.high
         wanted = 0.5 * (low + high) + 0.5 * (high - low) * part.astype(np.float64)
         expected, gained, terminated, truncated, info = legs.step(wanted)
         np.testing.assert_array_equal(seen, expected.astype(np.float32))
