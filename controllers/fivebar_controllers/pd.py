@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import ClassVar, Literal
 
 import msgspec
+import numpy as np
 
 from fivebar_sim.arrays import Array
 from fivebar_sim.checks import check_number
@@ -33,6 +34,10 @@ class Pd(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     Attributes:
         kp: Position gain of each motor [N m/rad].
         kd: Derivative gain [N m s/rad].
+        kp_opening: Position gain of the leg's opening, half the difference of the motors' angles;
+            kp is then that of its direction, their mean. None: kp for both, so that each motor has
+            its own angle alone.
+        kd_opening: Derivative gain of the same; None: kd.
         derivative: Whether kd acts on the measured rate or on the rate's error.
         period: Time between two commands T [s].
     """
@@ -41,12 +46,18 @@ class Pd(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
 
     kp: float = 1.0
     kd: float = 0.01
+    kp_opening: float | None = None
+    kd_opening: float | None = None
     derivative: Literal["measurement", "error"] = "measurement"
     period: float = 0.001
 
     def __post_init__(self) -> None:
         check_number("kp", self.kp, "N m/rad", low=0.0)
         check_number("kd", self.kd, "N m s/rad", low=0.0)
+        for key in ("kp_opening", "kd_opening"):
+            value = getattr(self, key)
+            if value is not None:
+                check_number(key, value, "N m/rad" if key == "kp_opening" else "N m s/rad", low=0.0)
         check_number("period", self.period, "s", low=0.0, strict=True)
 
     def command(self, leg: FiveBar, servo: Servo, seen: Observation, wanted: Reference) -> Array:
@@ -55,4 +66,22 @@ class Pd(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
         rate = -seen.theta_dot
         if self.derivative == "error":
             rate = wanted.theta_dot - seen.theta_dot
-        return self.kp * (wanted.theta - seen.theta) + self.kd * rate
+        error = wanted.theta - seen.theta
+        return _weighed(self.kp, self.kp_opening, error) + _weighed(self.kd, self.kd_opening, rate)
+
+
+def _weighed(mean: float, opening: float | None, pair: Array) -> Array:
+    """Return a gain by a pair of A and E; with two gains, of their mean and of half what differs.
+
+        (mean m + opening d, mean m - opening d),   m = (A + E) / 2,   d = (A - E) / 2
+
+    Args:
+        mean: The gain.
+        opening: That of the half difference; None: the same, to the last bit.
+        pair: (A, E), (..., 2).
+    """
+    if opening is None:
+        return mean * pair
+    middle = 0.5 * mean * pair.sum(axis=-1, keepdims=True)
+    half = 0.5 * opening * (pair[..., :1] - pair[..., 1:])
+    return np.concatenate([middle + half, middle - half], axis=-1)

@@ -1,0 +1,50 @@
+"""Joint PD with a gain for the leg's direction and one for its opening, as the Doggo has it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from fivebar_controllers.pd import Pd
+
+from fivebar_sim.arrays import Array
+from fivebar_sim.control import Observation, Reference
+from fivebar_sim.control.servo import Servo
+from fivebar_sim.errors import ArgumentError
+from fivebar_sim.geometry import FiveBar
+
+LEG = FiveBar.load("doggo")
+
+
+def command(law: Pd, error: Any, rate: Any) -> Array:
+    """Return the torques of a law for errors of A and E [rad] and rates [rad/s]."""
+    zero = np.zeros_like(error)
+    seen = Observation(0.0, zero - error, np.asarray(rate))
+    return law.command(LEG, Servo(), seen, Reference(*[zero] * 7, payload=0.0))
+
+
+def test_each_gain_acts_on_its_own_angle(rng: np.random.Generator) -> None:
+    """Virtual work: both torques together turn the leg, half their difference opens it."""
+    law = Pd(kp=80.0, kd=0.5, kp_opening=50.0, kd_opening=0.2)
+    error = rng.uniform(-1.0, 1.0, (5, 3, 2))
+    rate = rng.uniform(-9.0, 9.0, (5, 3, 2))
+    torque = command(law, error, rate)
+    A = torque[..., 0]
+    E = torque[..., 1]
+    theta, theta_dot = [0.5 * pair.sum(axis=-1) for pair in (error, rate)]
+    gamma, gamma_dot = [0.5 * (pair[..., 0] - pair[..., 1]) for pair in (error, rate)]
+    np.testing.assert_allclose(0.5 * (A + E), 80.0 * theta - 0.5 * theta_dot, atol=1e-12)
+    np.testing.assert_allclose(0.5 * (A - E), 50.0 * gamma - 0.2 * gamma_dot, atol=1e-12)
+
+
+def test_equal_gains_are_those_of_each_motor(rng: np.random.Generator) -> None:
+    error = rng.uniform(-1.0, 1.0, (7, 2))
+    rate = rng.uniform(-9.0, 9.0, (7, 2))
+    both = command(Pd(kp=3.0, kd=0.1, kp_opening=3.0, kd_opening=0.1), error, rate)
+    np.testing.assert_allclose(both, command(Pd(kp=3.0, kd=0.1), error, rate), atol=1e-14)
+
+
+def test_negative_gain_is_refused() -> None:
+    with pytest.raises(ArgumentError, match=r"kp_opening must be in \[0, inf\) N m/rad, got -1"):
+        Pd(kp_opening=-1.0)
