@@ -14,9 +14,13 @@ from collections.abc import Sequence
 import numpy as np
 
 from fivebar_sim.errors import FiveBarError
+from fivebar_sim.robots import LEGS
+from fivebar_sim.robots.measure import Gone, measure
 from fivebar_sim.robots.scenario import RobotScenario
 from fivebar_sim.scenario import Scenario
 from fivebar_sim.walking.draws import Outcome, draw, outcomes
+from fivebar_sim.walking.plan import plan_scenario
+from fivebar_sim.walking.walk import walk
 
 SEED = 16
 """Of the draws of docs/robots.md."""
@@ -38,8 +42,12 @@ ASSUMED = {
     "gear friction - 50 %": ["robot.servo.friction=0.00275"],
     "gear friction + 50 %": ["robot.servo.friction=0.00825"],
     "foot of 4 mm": ["robot.leg.foot_radius=0.004"],
+    "steps of 0.5 ms": ["sim.timestep=0.0005"],
 }
 """What robots/q8bot.toml and servos/xl330.toml assume, moved one at a time over honest ranges."""
+
+SOFT = (0.0025, 0.001)
+"""Time constants of a foot's contact beside the model's 5 ms [s]; in steps of 0.5 ms."""
 
 
 def middle(values: Sequence[float], digits: int = 3) -> str:
@@ -71,12 +79,26 @@ def assumed(name: str) -> list[str]:
         except FiveBarError as error:
             rows.append(f"| {label} | {error} |")
             continue
-        moved = found.moved
-        rows.append(
-            f"| {label} | {moved.body_lengths_per_second:.2f} | {moved.turn_rate:.2f} | "
-            f"{moved.falls} |"
-        )
-    return rows
+        rows.append(_row(label, found.moved))
+    return [*rows, *(_row(f"contact of {1e3 * soft:g} ms", harder(name, soft)) for soft in SOFT)]
+
+
+def _row(label: str, moved: Gone) -> str:
+    return (
+        f"| {label} | {moved.body_lengths_per_second:.2f} | {moved.turn_rate:.2f} | {moved.falls} |"
+    )
+
+
+def harder(name: str, soft: float) -> Gone:
+    """Return how a robot moves on contacts of another time constant [s], in steps of 0.5 ms."""
+    scenario = Scenario.load(name, ["sim.timestep=0.0005"])
+    assert isinstance(scenario, RobotScenario)
+    planned = plan_scenario(scenario)
+    for leg in LEGS:
+        planned.model.geom(f"{leg}_foot").solref[0] = soft
+    went = walk(planned)
+    assert went.trunk is not None
+    return measure(went.trunk, planned.window, planned.robot.length, len(went.falls))
 
 
 def main() -> None:
@@ -85,11 +107,12 @@ def main() -> None:
     parser.add_argument("scenarios", nargs="+")
     parser.add_argument("--count", type=int, default=64)
     parser.add_argument("--seed", type=int, default=SEED)
-    parser.add_argument("--assumed", action="store_true", help="the second table too")
+    parser.add_argument("--assumed", action="store_true", help="the other tables too")
     asked = parser.parse_args()
 
-    print("| scenario | stays up | body lengths/s | turns [rad/s] | leans up to [deg] |")
-    for name in asked.scenarios:
+    if asked.count:
+        print("| scenario | stays up | body lengths/s | turns [rad/s] | leans up to [deg] |")
+    for name in asked.scenarios if asked.count else ():
         scenario = Scenario.load(name)
         assert isinstance(scenario, RobotScenario)
         print(summary(name, outcomes(draw(scenario, asked.count, asked.seed))), flush=True)
