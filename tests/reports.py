@@ -6,6 +6,10 @@ from html.parser import HTMLParser
 from pathlib import Path
 from typing import NamedTuple
 
+from fivebar_sim.report import in_plane, over_time
+from fivebar_sim.report.draw import Drawn
+from fivebar_sim.runs.stored import StoredRun
+
 VOID = {"meta", "br", "link", "img", "input", "hr", "wbr"}
 
 
@@ -66,3 +70,9 @@ class Page(HTMLParser):
             elif element.tag in ("td", "th"):
                 rows[-1].append(" ".join("".join(element.text).split()))
         return rows
+
+
+def two_figures(run: StoredRun) -> list[Drawn]:
+    """Return the figures of one in the plane and one over time, without drawing the others."""
+    drawn = [in_plane.foot_path(run), over_time.tracking_error(run)]
+    return [one for one in drawn if one is not None]

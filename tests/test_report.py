@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 from msgspec.structs import replace
-from reports import Page
+from reports import Page, two_figures
 from sealed import seal
 from shell import Shell
 
@@ -22,8 +22,7 @@ from fivebar_sim.files import tables
 from fivebar_sim.metrics import judge, look_up
 from fivebar_sim.metrics.catalogue import LISTED, SHOWN, shown
 from fivebar_sim.metrics.limits import bounds, has
-from fivebar_sim.report import comparison, in_plane, look, over_time, single
-from fivebar_sim.report.draw import Drawn
+from fivebar_sim.report import comparison, look, single
 from fivebar_sim.runs import directory, stored
 from fivebar_sim.scenario import Scenario
 
@@ -225,12 +224,6 @@ def test_same_runs_same_bytes(
     assert page.read_text(encoding="utf-8") == pages["trot"].source
 
 
-def two_figures(run: stored.StoredRun) -> list[Drawn]:
-    """Return the figures of one in the plane and one over time, without drawing the others."""
-    drawn = [in_plane.foot_path(run), over_time.tracking_error(run)]
-    return [one for one in drawn if one is not None]
-
-
 def test_same_runs_same_pictures(
     runs: dict[str, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -268,8 +261,10 @@ def test_the_command_writes_a_report_anew_where_there_was_one(
     run = shutil.copytree(runs[LIMITED], shell.folder / "mine")
     (run / "report.html").write_text("of the old run")
     # A motor that clips is slow to simulate, and nothing here asks for it.
-    other = ("--set", "path.frequency=3.0", "--set", "servo.limit=0.5")
-    again = ("run", "mine/scenario.toml", "--quiet", *other)
+    again = (
+        *("run", "mine/scenario.toml", "--quiet"),
+        *("--set", "path.frequency=3.0", "--set", "servo.limit=0.5"),
+    )
     assert shell(*again, "--out", "mine").status in (0, 1)
     assert "frequency = 3.0" in (run / "report.html").read_text()
     assert shell(*again, "--out", "other").status in (0, 1)
