@@ -169,6 +169,7 @@ def test_published_faults_are_found_and_nothing_else() -> None:
     for report in (zero, fallback, truncated):
         assert len(report.faults) > 500
         assert report.right > 500
+        assert report.right + len(report.faults) + report.left_out == report.asked
         assert report.troubles == []
         assert not report.passes
 

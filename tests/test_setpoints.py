@@ -62,6 +62,19 @@ def test_path_without_a_period_goes_to_its_end(tmp_path: Path) -> None:
     np.testing.assert_allclose(ends, [[0.0, -0.07], [0.01, -0.08]], rtol=0, atol=1e-12)
 
 
+def test_angles_go_on_over_half_a_turn(tmp_path: Path) -> None:
+    """A servo that turns past its back must not be sent a whole turn round."""
+    (tmp_path / "step.toml").write_text(
+        STEP.replace("[[0.0, -0.07], [0.01, -0.08]]", "[[-0.065, 0.0], [-0.055, 0.06]]")
+    )
+    scenario = Scenario.load(tmp_path / "step.toml")
+    theta = setpoints.rows(scenario, 100.0).theta
+    foot = kinematics.forward(scenario.leg, theta)
+    jumps = np.diff(kinematics.inverse(scenario.leg, foot), axis=0)
+    assert np.abs(jumps).max() > 6.0
+    assert np.abs(np.diff(theta, axis=0)).max() < 0.2
+
+
 def test_commands_are_the_servos(ellipse: Scenario) -> None:
     leg = ellipse.leg
     theta = setpoints.rows(ellipse, 100.0).theta
