@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import tomllib
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
+import tomli_w
 
 from fivebar_sim import FiveBar, design
 from fivebar_sim.design.evaluation.objectives import CATALOGUE
+from fivebar_sim.design.task.motions import AFFINE, sampled
 from fivebar_sim.design.task.variables import Variable
 from fivebar_sim.errors import ConfigError, FiveBarError
 from fivebar_sim.files import resources
@@ -36,7 +39,7 @@ def load(folder: Path, text: str) -> design.Task:
 @pytest.mark.parametrize("name", resources.shipped("designs"))
 def test_shipped_task_has_a_feasible_design(name: str) -> None:
     task = design.load(name)
-    assert design.evaluate(task, task.sample(200)).feasible.any()
+    assert design.evaluate(task, task.sample(2000)).feasible.any()
 
 
 @pytest.mark.parametrize(
@@ -164,6 +167,80 @@ def test_values_of_a_range_are_equally_likely_and_legal(rng: np.random.Generator
     assert choice.from_unit(np.array([0.0, 1.0])).tolist() == [0.0, 2.0]
     assert choice.grid(2).tolist() == [0.0, 1.0, 2.0]
     assert Variable("gear", 1.0, 2.0).grid(3).tolist() == [1.0, 1.5, 2.0]
+
+
+PATHS = [
+    ("ellipse", {"centre": [0.01, -0.08], "radii": [0.02, 0.01], "frequency": 2.0}),
+    ("circle", {"centre": [0.01, -0.08], "radius": 0.02, "frequency": 2.0}),
+    ("figure-eight", {"centre": [0.01, -0.08], "radii": [0.02, 0.01], "frequency": 2.0}),
+    ("line", {"start": [0.01, -0.08], "stop": [0.0, -0.07], "frequency": 2.0}),
+    ("gait", {"centre": [0.01, -0.08], "stride": 0.03, "lift": 0.01, "frequency": 2.0}),
+    (
+        "gait",
+        {"centre": [0.0, -0.08], "stride": 0.03, "lift": 0.01, "frequency": 2.0, "running": True},
+    ),
+    ("sine", {"centre": [0.0, -0.08], "stride": 0.03, "lift": 0.01, "push": 0.1, "frequency": 1.0}),
+    ("hop", {"low": 0.06, "high": 0.08, "thrust": 0.3, "flight": 0.3, "x": 0.01, "frequency": 1.0}),
+    ("step", {"start": [0.01, -0.08], "stop": [0.0, -0.07], "lift": 0.01, "seconds": 0.4}),
+]
+
+
+@pytest.mark.parametrize(("kind", "keys"), PATHS)
+def test_numbers_of_a_path_are_blended_as_each_path_has_them(
+    tmp_path: Path, kind: str, keys: dict[str, Any]
+) -> None:
+    """All at once: that every sample is affine in each of them is not enough."""
+    words = {key: value for key, value in keys.items() if key in AFFINE}
+    vary: dict[str, Any] = {}
+    for key, value in words.items():
+        for k, number in enumerate(value if isinstance(value, list) else [value]):
+            name = (
+                f"motion.walk.path.{key}.{k}"
+                if isinstance(value, list)
+                else f"motion.walk.path.{key}"
+            )
+            vary[name] = [number, number + 0.002]
+    table: dict[str, Any] = {
+        "vary": {**vary, "motion.walk.payload": [0.0, 0.1]},
+        "motion": {"walk": {"payload": 0.0, "path": {"kind": kind, **keys}}},
+        "leg": "classic",
+        "samples": 9,
+    }
+    if kind == "gait":
+        table["motion"]["walk"]["force"] = {"kind": "stance", "peak": [0.1, 1.0]}
+        table["vary"]["motion.walk.force.peak.0"] = [0.0, 0.2]
+    task = load(tmp_path, tomli_w.dumps(table))
+    assert task.variation.is_affine("motion.walk.")
+    values = task.sample(5)
+    blended = task.moving(task.motions[0], values)
+    for k, row in enumerate(values):
+        own = sampled(task.motions_of(row)[0], task.samples)
+        for name in own._fields:
+            got = np.broadcast_to(getattr(blended, name), (5, *getattr(own, name).shape[1:]))[k]
+            expected = getattr(own, name)[0]
+            scale = max(1e-3, float(np.abs(expected).max()))
+            np.testing.assert_allclose(got, expected, rtol=0, atol=1e-13 * scale, err_msg=name)
+
+
+def test_points_of_a_region_are_blended_as_each_region_has_them(tmp_path: Path) -> None:
+    text = (
+        PLAIN.split("[motion")[0].replace("torque_peak", "condition")
+        + """
+vary.region.a.low.0 = [-0.02, -0.01]
+vary.region.b.radius = [0.01, 0.02]
+vary.region.b.centre.1 = [-0.09, -0.07]
+region.a = { kind = "box", low = [0.0, -0.08], high = [0.01, -0.07] }
+region.b = { kind = "half-disc", centre = [0.0, -0.08], radius = 0.01 }
+"""
+    )
+    task = load(tmp_path, text)
+    values = task.sample(4)
+    for cover in range(2):
+        got = np.stack(np.broadcast_arrays(*task.points(task.covers[cover], values)), axis=-1)
+        for k, row in enumerate(values):
+            expected = task.covers_of(row)[cover].region.points(task.samples)
+            mine = np.broadcast_to(got, (4, *got.shape[1:]))[k]
+            np.testing.assert_allclose(mine, expected, rtol=0, atol=1e-16)
 
 
 def test_every_objective_says_what_it_is() -> None:

@@ -7,7 +7,6 @@ is dropped nor how the designs are cut into blocks changes a bit of the others.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -135,6 +134,7 @@ class _Block:
         measures: What is known of them, (n, k).
         measured: Columns of them that are filled.
         rows: Those that no constraint has dropped yet.
+        moving: Their foot motions.
     """
 
     def __init__(self, task: Task, bounds: tuple[Limit, ...], values: Array) -> None:
@@ -144,6 +144,7 @@ class _Block:
         self.measures = np.full((len(values), len(bounds)), np.nan)
         self.measured: set[int] = set()
         self.rows = np.arange(len(values))
+        self.moving: list[Moving] = []
 
     def evaluated(self) -> Evaluated:
         """Return what becomes of the designs."""
@@ -164,7 +165,11 @@ class _Block:
 
     def _follow(self, legs: Legs, motors: Motors, objectives: Array) -> None:
         """Measure all that follows from the poses of legs that can close."""
-        poses = [solved(legs, *points) for points in self._points()]
+        values = self.values[self.rows]
+        self.moving = [self.task.moving(motion, values) for motion in self.task.motions]
+        points = [(each.x, each.z) for each in self.moving]
+        points += [self.task.points(cover, values) for cover in self.task.covers]
+        poses = [solved(legs, *each) for each in points]
         self._put("reach", measures.least_slack(poses))
         self._put("singular", measures.least_sine(poses))
         legs, poses = self._still(legs, poses)
@@ -184,16 +189,8 @@ class _Block:
         if kept.all():
             return legs, poses
         self.rows = self.rows[kept]
+        self.moving = [each.take(kept) for each in self.moving]
         return legs.take(kept), [taken(p, kept) for p in poses]
-
-    def _points(self) -> Iterator[tuple[Array, Array]]:
-        """Yield the foot positions of every motion, then of every region."""
-        values = self.values[self.rows]
-        for motion in self.task.motions:
-            moving = self.task.moving(motion, values)
-            yield moving.x, moving.z
-        for cover in self.task.covers:
-            yield self.task.points(cover, values)
 
     def _wanted(self) -> set[str]:
         """Return the objectives that are sought or bounded."""
@@ -238,11 +235,10 @@ class _Block:
 
     def _found(self, legs: Legs, motors: Motors, poses: list[Poses], worst: Array) -> Found:
         """Return the designs that are left with the torques of their motions."""
-        values = self.values[self.rows]
-        driven = []
-        for motion, p in zip(self.task.motions, poses, strict=False):
-            moving = self.task.moving(motion, values)
-            driven.append(_driven(motion.weight, legs, motors, p, moving))
+        driven = [
+            _driven(motion.weight, legs, motors, p, moving)
+            for motion, p, moving in zip(self.task.motions, poses, self.moving, strict=False)
+        ]
         return Found(legs, motors, driven, worst)
 
     def _last(self, found: Found, objectives: Array) -> None:

@@ -20,6 +20,10 @@ STEP = 1e-9
 """Slack of joint stops, for rounding [rad]."""
 
 
+NEAR = 0.05
+"""Reach in sizes of the leg of which the spare is taken at least: of 0 it would be nothing."""
+
+
 class Limit(NamedTuple):
     """The range of a measure.
 
@@ -50,7 +54,7 @@ def limits(task: Task, *, spare: float = 0.0) -> tuple[Limit, ...]:
     c = task.constraints
     found = [
         Limit("closes", "m", low=0.0),
-        Limit("reach", "m", low=c.reach * (1.0 + spare)),
+        Limit("reach", "m", low=c.reach + spare * max(c.reach, NEAR * task.leg.size)),
         Limit("singular", "", low=min(c.singular * (1.0 + spare), 1.0)),
     ]
 

@@ -75,9 +75,11 @@ def sobol(task: Task) -> tuple[Asking, int]:
     total = task.search.designs
 
     def ask() -> Asking:
-        sampler = qmc.Sobol(len(task.names), rng=np.random.default_rng(task.search.seed))
+        sampler = qmc.Sobol(len(task.names), scramble=False)
+        # Shifted by one random vector, so that each seed has a sample of its own.
+        shift = np.random.default_rng(task.search.seed).random(len(task.names))
         for rows in _blocks(total):
-            yield task.from_unit(_drawn(sampler, len(rows)))
+            yield task.from_unit((_drawn(sampler, len(rows)) + shift) % 1.0)
 
     return ask(), total
 

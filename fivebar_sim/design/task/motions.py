@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import ClassVar, Literal, NamedTuple
 
 import msgspec
@@ -99,6 +100,35 @@ def sampled(motion: FootMotion, samples: int) -> Moving:
 def stacked(each: list[Moving]) -> Moving:
     """Return the motions of n designs as one."""
     return Moving(*(np.concatenate(parts) for parts in zip(*each, strict=True)))
+
+
+AFFINE = {
+    *("centre", "radii", "radius", "start", "stop", "stride", "lift", "push", "x", "low", "high"),
+    *("peak", "value", "payload"),
+}
+"""Keys of shipped paths, forces and regions in which all that is sampled is affine: it changes in
+proportion to them."""
+
+
+def blended(corners: Sequence[Sequence[Array]], shares: Array) -> list[Array]:
+    """Return arrays that are affine in the shares of some ranges, (1, N) or (n, N) each.
+
+        first + sum of share_k (corner_k - first)
+
+    Args:
+        corners: The arrays (1, N) with all shares 0, then with one of them 1 and the others 0.
+        shares: Of n designs, (n, k).
+    """
+    first, *others = corners
+    found = []
+    for i, start in enumerate(first):
+        total = start
+        for k, corner in enumerate(others):
+            # What does not change stays one row for all designs.
+            if not np.array_equal(corner[i], start):
+                total = total + shares[:, k : k + 1] * (corner[i] - start)
+        found.append(total)
+    return found
 
 
 class Region(

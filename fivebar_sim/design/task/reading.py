@@ -109,8 +109,8 @@ def _keys(table: Mapping[str, Any]) -> list[str]:
     """Return the dotted keys of all numbers in a table, with the index of those in arrays."""
     found = []
     for key, value in tables.flat(table):
-        # Another kind would have other keys.
-        if key != "kind" and not key.endswith(".kind"):
+        # Another kind would have other keys, and what a motion counts is no part of a design.
+        if key.split(".")[-1] not in ("kind", "weight"):
             found.append(key)
         if isinstance(value, list):
             found += [f"{key}.{k}" for k, each in enumerate(value) if is_finite(each)]

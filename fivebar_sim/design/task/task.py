@@ -3,20 +3,30 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import tomli_w
 
+from fivebar_sim import paths
 from fivebar_sim.arrays import Array
 from fivebar_sim.control.servo import Servo
 from fivebar_sim.design.evaluation.legs import Legs, columns, leg_table, numbers
 from fivebar_sim.design.evaluation.motors import Motors, through
 from fivebar_sim.design.task import parts, reading
-from fivebar_sim.design.task.motions import Cover, FootMotion, Moving, Region, sampled, stacked
+from fivebar_sim.design.task.motions import (
+    Cover,
+    FootMotion,
+    Moving,
+    Region,
+    blended,
+    sampled,
+    stacked,
+)
 from fivebar_sim.design.task.options import Constraints, Search
 from fivebar_sim.design.task.variation import Variation, put
 from fivebar_sim.geometry import FiveBar
@@ -58,6 +68,7 @@ class Task:
     search: Search
     samples: int
     _fixed: dict[str, Moving] = field(default_factory=dict, repr=False)
+    _ends: dict[str, list[Sequence[Array]]] = field(default_factory=dict, repr=False)
 
     @classmethod
     def load(cls, source: str | Path) -> Task:
@@ -149,21 +160,60 @@ class Task:
                 self._fixed[motion.name] = sampled(motion, self.samples)
             return self._fixed[motion.name]
 
+        plain = type(motion.path) in paths.KINDS.values()
+        if plain and self.variation.is_affine(f"motion.{motion.name}."):
+            return Moving(
+                *self._blended(
+                    f"motion.{motion.name}.", own, values, partial(self._sampled, motion)
+                )
+            )
+
         # Paths are objects: each different one is made once.
         _, first, which = np.unique(values[:, own], axis=0, return_index=True, return_inverse=True)
-        each = [
-            sampled(self._motion(motion, self.settings(values[k])), self.samples) for k in first
-        ]
+        each = [self._sampled(motion, values[k]) for k in first]
         return stacked(each).take(which.ravel()) if len(each) > 1 else each[0]
 
     def points(self, cover: Cover, values: Array) -> tuple[Array, Array]:
         """Return x and z of points that fill a region [m], (1, N) or of each design (n, N)."""
-        if not self.variation.sources(f"region.{cover.name}."):
-            found = cover.region.points(self.samples)[None]
-        else:
-            each = [self._region(cover, self.settings(row)) for row in values]
-            found = np.stack([region.points(self.samples) for region in each])
-        return np.ascontiguousarray(found[..., 0]), np.ascontiguousarray(found[..., 1])
+        prefix = f"region.{cover.name}."
+        own = self.variation.sources(prefix)
+        if not own:
+            x, z = cover.region.points(self.samples).T.copy()
+            return x[None], z[None]
+        if self.variation.is_affine(prefix):
+            x, z = self._blended(prefix, own, values, partial(self._filled, cover))
+            return x, z
+        each = np.stack([np.concatenate(self._filled(cover, row)) for row in values], axis=1)
+        return each[0], each[1]
+
+    def _sampled(self, motion: FootMotion, row: Array) -> Moving:
+        return sampled(self._motion(motion, self.settings(row)), self.samples)
+
+    def _filled(self, cover: Cover, row: Array) -> tuple[Array, Array]:
+        x, z = self._region(cover, self.settings(row)).points(self.samples).T.copy()
+        return x[None], z[None]
+
+    def _blended(
+        self, key: str, own: list[int], values: Array, at: Callable[[Array], Sequence[Array]]
+    ) -> list[Array]:
+        """Return arrays that are affine in the columns `own`, from those at their ends.
+
+        Args:
+            key: What is blended: its ends are computed once.
+            own: The columns.
+            values: The designs, (n, d).
+            at: Returns the arrays of one design (d,).
+        """
+        low, high = self.bounds
+        if key not in self._ends:
+            corners = [at(low)]
+            for k in own:
+                row = low.copy()
+                row[k] = high[k]
+                corners.append(at(row))
+            self._ends[key] = corners
+        span = np.where(high > low, high - low, 1.0)
+        return blended(self._ends[key], ((values - low) / span)[:, own])
 
     def _leg_table(self, row: Array) -> dict[str, Any]:
         table = self._named(leg_table(self.leg))

@@ -117,10 +117,19 @@ def read(
 def _flat(table: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
     """Yield (dotted key, how it varies)."""
     for key, value in table.items():
-        if isinstance(value, Mapping) and not (value and set(value) & WORDS):
+        if isinstance(value, Mapping) and value and not _is_range(value):
             yield from _flat(value, f"{prefix}{key}.")
         else:
             yield f"{prefix}{key}", value
+
+
+def _is_range(table: Mapping[str, Any]) -> bool:
+    """Return whether a table says how a key varies; else it has further keys, also of such names.
+
+    The key "low" of a region is itself varied by [low, high] or a table, never by one number.
+    """
+    kinds = {"choice": list, "tie": str}
+    return any(isinstance(v, kinds.get(k, int | float)) for k, v in table.items() if k in WORDS)
 
 
 def _read(key: str, value: Any, where: str) -> Variable | Tie:

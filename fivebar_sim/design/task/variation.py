@@ -9,6 +9,7 @@ import numpy as np
 
 from fivebar_sim.arrays import Array
 from fivebar_sim.design.evaluation.legs import TUPLES
+from fivebar_sim.design.task.motions import AFFINE
 from fivebar_sim.design.task.variables import Tie, Variable
 
 
@@ -61,6 +62,14 @@ class Variation:
         own = [k for k, name in enumerate(self.names) if name.startswith(prefix)]
         tied = [tie.to for tie in self.ties if tie.key.startswith(prefix)]
         return sorted({*own, *(self.names.index(to) for to in tied)})
+
+    def is_affine(self, prefix: str) -> bool:
+        """Return whether all keys below a prefix that vary are numbers of `AFFINE`."""
+        keys = [key for key in self.keys if key.startswith(prefix)]
+        # The last part that is no index: "centre" of "motion.walk.path.centre.1".
+        words = [[part for part in key.split(".") if not part.isdigit()][-1] for key in keys]
+        numbers = not any(self._choice(key) for key in keys)
+        return numbers and all(word in AFFINE for word in words)
 
     def columns(self, values: Array, prefix: str) -> dict[str, Array]:
         """Return the columns (n,) of the numbers below a prefix, whose keys lose it."""
