@@ -191,6 +191,18 @@ def test_damaged_block_is_evaluated_again(tmp_path: Path, monkeypatch: pytest.Mo
     assert search(task, tmp_path / "out").fresh == 128
 
 
+def test_search_killed_at_its_very_start_goes_on(tmp_path: Path) -> None:
+    task = load(tmp_path, TWO + 'method = "grid"\npoints = 3')
+    (tmp_path / "half").mkdir()
+    (tmp_path / "half" / ".fivebar-abc.json").write_text("{")
+    assert search(task, tmp_path / "half").designs == 9
+    # With its state and nothing else.
+    (tmp_path / "state").mkdir()
+    state = (tmp_path / "half" / "state.json").read_text().replace("true", "false")
+    (tmp_path / "state" / "state.json").write_text(state)
+    assert search(task, tmp_path / "state").fresh == 9
+
+
 def test_no_feasible_design_says_what_excludes_how_many(tmp_path: Path) -> None:
     task = load(
         tmp_path, TWO.replace("reach = 0.002", "reach = 0.2") + 'method = "grid"\npoints = 4'

@@ -58,6 +58,9 @@ PURE = (
     "control.bus",
     "control.noise",
     "control.step",
+    "design",
+    "design.certificate.best",
+    "design.search.run",
     "tasks",
     "tasks.episodes",
 )

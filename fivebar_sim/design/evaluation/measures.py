@@ -21,7 +21,7 @@ STEP = 1e-9
 
 
 NEAR = 0.05
-"""Reach in sizes of the leg of which the spare is taken at least: of 0 it would be nothing."""
+"""Reach in sizes of the leg of which the spare is taken where 0 is asked: of 0 it is nothing."""
 
 
 class Limit(NamedTuple):
@@ -54,7 +54,7 @@ def limits(task: Task, *, spare: float = 0.0) -> tuple[Limit, ...]:
     c = task.constraints
     found = [
         Limit("closes", "m", low=0.0),
-        Limit("reach", "m", low=c.reach + spare * max(c.reach, NEAR * task.leg.size)),
+        Limit("reach", "m", low=c.reach + spare * (c.reach or NEAR * task.leg.size)),
         Limit("singular", "", low=min(c.singular * (1.0 + spare), 1.0)),
     ]
 

@@ -65,12 +65,12 @@ class Store:
             self.finished = bool(known.get("finished"))
             return
 
-        if self.folder.exists() and (not self.folder.is_dir() or any(self.folder.iterdir())):
+        if self.folder.exists() and (not self.folder.is_dir() or _others(self.folder)):
             raise RunDirectoryError(f"{self.folder} is there, and is no directory of a search")
         whole_file.check_parent(self.folder, RunDirectoryError)
-        (self.folder / "blocks").mkdir(parents=True, exist_ok=True)
-        whole_file.write(self.folder / TASK, Path(self.task.where).read_bytes())
+        # First of all: a search that is killed before the next line must find itself again.
         self._write_state()
+        whole_file.write(self.folder / TASK, Path(self.task.where).read_bytes())
 
     def _write_state(self) -> None:
         state = {"fingerprint": self.fingerprint, "finished": self.finished}
@@ -98,6 +98,7 @@ class Store:
         """Keep a block."""
         import pyarrow.parquet as pq
 
+        self.path(number).parent.mkdir(exist_ok=True)
         with whole_file.stage(self.path(number)) as place:
             pq.write_table(self._table(block), place)
 
@@ -156,6 +157,11 @@ class Store:
         broken = [each.violation(numbers[:, m + k]) for k, each in enumerate(bounds)]
         violations = np.stack(broken, axis=1)
         return Evaluated(numbers[:, :d], numbers[:, d:m], numbers[:, m:], violations)
+
+
+def _others(folder: Path) -> bool:
+    """Return whether a folder holds anything but what a killed program left half written."""
+    return any(not path.name.startswith(".fivebar-") for path in folder.iterdir())
 
 
 def fingerprint(task: Task) -> str:
