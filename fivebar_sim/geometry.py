@@ -46,7 +46,7 @@ HEAVIEST = 1e6
 """Largest mass [kg], inertia [kg m^2] and density [kg/m^3]."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, repr=False)
 class FiveBar:
     """A five-bar leg in m, kg and rad; the defaults are those of the classic leg.
 
@@ -241,6 +241,15 @@ class FiveBar:
             ConfigError: Unknown preset, unreadable file, unknown key, or a value out of range.
         """
         return cls.from_table(read_table(source), str(source))
+
+    def __repr__(self) -> str:
+        """Return what differs from the classic leg; Python makes the same leg of it."""
+        own = [
+            f"{field.name}={getattr(self, field.name)!r}"
+            for field in fields(self)
+            if getattr(self, field.name) != field.default
+        ]
+        return f"FiveBar({', '.join(own)})"
 
     @classmethod
     def from_table(cls, table: Mapping[str, Any], where: str) -> FiveBar:

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import importlib
+import subprocess
 from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, NamedTuple
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -27,6 +31,11 @@ from fivebar_sim.simulation.steps import States, Watch, simulated
 from fivebar_sim.walking.measure import measure as measure_robot
 from fivebar_sim.walking.plan import RobotPlan, plan_scenario
 from fivebar_sim.walking.walk import walk
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from fivebar_sim.runs.stored import StoredRun
 
 AnyPlan = Plan | RobotPlan
 """A checked scenario of a leg or of a robot."""
@@ -96,6 +105,83 @@ class Result(NamedTuple):
         from fivebar_sim.runs import directory
 
         return directory.write(self, Path(path))
+
+    def plot(self, name: str = "foot-path") -> Figure:
+        """Return a Matplotlib figure of the run, one of its report's.
+
+        Args:
+            name: angles, error, error-parts, foot-path, gap, ground, leg, load-share, power,
+                speeds, torque or torque-speed.
+
+        Raises:
+            ArgumentError: Another name, a robot's run, or nothing to draw.
+        """
+        from fivebar_sim.report import notebook
+
+        return notebook.plot(self._stored, name)
+
+    def to_pandas(self) -> Any:
+        """Return the record as a pandas DataFrame, SI; pandas must be installed."""
+        return _library("pandas").DataFrame(self.record)
+
+    def to_polars(self) -> Any:
+        """Return the record as a polars DataFrame, SI; polars must be installed."""
+        return _library("polars").DataFrame(dict(self.record))
+
+    def report(self, path: str | Path) -> Path:
+        """Write the HTML page that explains the run, and return its place.
+
+        Raises:
+            RunDirectoryError: The place does not end in .html, or cannot be written.
+        """
+        from fivebar_sim.report.write import write
+
+        with self._kept() as place:
+            return write([place], Path(path))[-1]
+
+    def replay(self) -> None:
+        """Show the run in Rerun's viewer until its window is closed.
+
+        Raises:
+            ConfigError: There is no screen.
+        """
+        from fivebar_sim.recording import viewer
+        from fivebar_sim.render import screen
+        from fivebar_sim.runs import recording_file
+
+        screen.check("`fivebar replay RUN_DIR --web` shows a run in a browser")
+        with self._kept() as place, recording_file.opened((place,)) as file:
+            command = viewer.native_command(file)
+            subprocess.run(command, env=viewer.quiet_environment())
+
+    def _repr_html_(self) -> str:
+        """Return what a notebook shows: verdict, metrics, and the leg over its path."""
+        from fivebar_sim.report import notebook
+
+        return notebook.fragment(self._stored)
+
+    @property
+    def _stored(self) -> StoredRun:
+        """The run as reports take it."""
+        from fivebar_sim.runs.stored import StoredRun
+
+        return StoredRun(Path(self.scenario.name), self.scenario, self.record, self.measured)
+
+    @contextmanager
+    def _kept(self) -> Iterator[Path]:
+        """Have the run directory in a temporary folder within."""
+        with TemporaryDirectory(prefix="fivebar-") as folder:
+            yield self.write(Path(folder) / self.scenario.name)
+
+
+def _library(name: str) -> Any:
+    """Return a library that fivebar-sim does not bring."""
+    try:
+        return importlib.import_module(name)
+    except ModuleNotFoundError as error:
+        raise ModuleNotFoundError(
+            f"to_{name} needs {name} ({error}): pip install {name}", name=error.name
+        ) from error
 
 
 class Kind(NamedTuple):
