@@ -20,7 +20,7 @@ from fivebar_sim.errors import RunDirectoryError
 from fivebar_sim.files import exchange, leftovers, quantities, whole_file
 from fivebar_sim.metrics.columns import digest
 from fivebar_sim.recording import rrd
-from fivebar_sim.runs import checksums, recorded
+from fivebar_sim.runs import checksums, described, recorded
 from fivebar_sim.runs.kept import DIVERGED, FILES, keep, own_names
 
 RECORDING = "recording.rrd"
@@ -188,7 +188,7 @@ def _fill(stage: Path, result: rrd.Run) -> None:
 
 
 def write_record(folder: Path, record: Mapping[str, Array], others: Iterable[str]) -> None:
-    """Write the record as Parquet, one column each, with checksums that show damage.
+    """Write the record as Parquet, one column each, with units, and checksums that show damage.
 
     Byte by byte, as all signs and exponents are alike: a third of the size, in a third of the time.
 
@@ -201,7 +201,10 @@ def write_record(folder: Path, record: Mapping[str, Array], others: Iterable[str
     import pyarrow.parquet
 
     sums = checksums.of_files(folder, others) | {checksums.RECORD: digest(record)}
-    table = pyarrow.table(dict(record)).replace_schema_metadata(checksums.written(sums))
+    said = described.metadata(record)
+    fields = [pyarrow.field(name, pyarrow.float64(), metadata=said.get(name)) for name in record]
+    schema = pyarrow.schema(fields, metadata=checksums.written(sums))
+    table = pyarrow.table(dict(record), schema=schema)
     # Given a name instead of a file, pyarrow would expand ~ and read it as a URI.
     with (folder / checksums.RECORD).open("wb") as file:
         pyarrow.parquet.write_table(
