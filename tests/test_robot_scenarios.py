@@ -244,6 +244,12 @@ def test_leg_out_of_reach_is_named_with_when_and_where(shell: Shell) -> None:
     assert "out of reach" in said.err
 
 
+def test_table_of_a_robot_is_a_robots_wherever_it_comes_from() -> None:
+    again = Scenario.from_table(stand().table(), "table", Path())
+    assert again == stand()
+
+
+@pytest.mark.long
 def test_sweep_has_the_metrics_of_robots(shell: Shell) -> None:
     short = ["duration=0.1", "path.seconds=0.1", "path.ramp=0.05", "limits={}"]
     settings = [word for setting in short for word in ("--set", setting)]

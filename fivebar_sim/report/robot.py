@@ -62,6 +62,7 @@ def _head(run: StoredRun) -> str:
         f"{window.start * h:.4g} s to {window.stop * h:.4g} s, what is called (run) over the whole "
         f"run; a number without a leg's name is that of all legs together."
     )
+
     tripped = [f'<p class="fail">{text(said)}</p>' for said in guards.tripped(run.measured.guards)]
     return "\n".join(
         [

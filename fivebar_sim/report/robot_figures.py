@@ -200,6 +200,7 @@ def errors(run: StoredRun) -> Drawn:
     """Draw how far each foot is from its target."""
     figure, (ax,) = draw.panels(1, height=2.9)
     lines = {leg: 1e3 * tracking_error(of_leg(run.record, leg)) for leg in LEGS}
+
     for leg, values in lines.items():
         draw.line(ax, run.record["time"], values, NAMED[leg], label=leg)
     draw.shade_unmeasured(ax, run)

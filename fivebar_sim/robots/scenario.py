@@ -156,7 +156,7 @@ def _merge(table: Table, own: Table) -> None:
             table[key] = value
 
 
-def _gait(table: Any, where: str) -> tuple[dict[str, float], dict[str, float] | None]:
+def _gait(table: Any, where: str) -> tuple[dict[str, float], dict[str, float]]:
     """Return phases and strides of the table [gait]."""
     if not isinstance(table, dict):
         raise ConfigError(f"{where}: gait must be a table, got {table!r}")
@@ -167,11 +167,11 @@ def _gait(table: Any, where: str) -> tuple[dict[str, float], dict[str, float] | 
             raise ConfigError(f"{where}: gait.phases: {unknown('gait', phases, PHASES)}")
         phases = PHASES[phases]
 
-    strides = table.get("strides")
+    strides = table.get("strides", dict.fromkeys(LEGS, 1.0))
     for key, value in (("phases", phases), ("strides", strides)):
-        if not (isinstance(value, dict) or (value is None and key == "strides")):
+        if not isinstance(value, dict):
             raise ConfigError(f"{where}: gait.{key} must be a table of the legs, got {value!r}")
-    return dict(phases), strides
+    return dict(phases), dict(strides)
 
 
 def _scene(value: Any, where: str) -> Stage:
