@@ -6,8 +6,8 @@ import { apart, between } from "./plane.js";
 /** Setpoints of a path. */
 export const ROWS = 120;
 
-/** Passes of a three-point mean over what was drawn: a hand trembles. */
-const PASSES = 3;
+/** Passes of a three-point mean: a hand trembles, and at a corner no motor could follow. */
+const PASSES = 20;
 
 export class Path {
   constructor() {
@@ -45,9 +45,7 @@ export class Path {
       this.clear();
       return false;
     }
-    let points = resampled([...this.drawn, this.drawn[0]]);
-    for (let pass = 0; pass < PASSES; pass++) points = smoothed(points);
-    this.set(resampled([...points, points[0]]));
+    this.set(rounded([...this.drawn, this.drawn[0]]));
     return true;
   }
 
@@ -94,6 +92,13 @@ function resampled(points) {
   return found;
 }
 
+/** Return `ROWS` points of a closed line whose corners are rounded. */
+function rounded(line) {
+  let points = resampled(line);
+  for (let pass = 0; pass < PASSES; pass++) points = smoothed(points);
+  return resampled([...points, points[0]]);
+}
+
 function smoothed(points) {
   const n = points.length;
   return points.map((point, k) => {
@@ -116,15 +121,14 @@ function unwrap(rows) {
   }
 }
 
-/** Return a stride about a place: a flat stance and a lifted swing. */
+/** Return a stride about a place: a flat stance, and back through the air in half an ellipse. */
 export function stride(middle, long, high) {
   const points = [];
-  for (let k = 0; k < 240; k++) {
-    const share = k / 240;
-    const back = share < 0.5;
-    const across = back ? 0.5 - share * 2 : share * 2 - 1.5;
-    const up = back ? 0 : Math.sin((share - 0.5) * 2 * Math.PI) ** 2;
-    points.push([middle[0] + across * long, middle[1] + up * high]);
+  for (let k = 0; k <= 60; k++) points.push([middle[0] + (0.5 - k / 60) * long, middle[1]]);
+  for (let k = 1; k <= 60; k++) {
+    const angle = Math.PI * (1 - k / 60);
+    const across = 0.5 * long * Math.cos(angle);
+    points.push([middle[0] + across, middle[1] + high * Math.sin(angle)]);
   }
-  return resampled([...points, points[0]]);
+  return rounded(points);
 }

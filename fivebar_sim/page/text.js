@@ -8,6 +8,9 @@ const UNITS = ["m", "m", "m", "m", "m", "m", "rad", "rad"];
 /** Time of one loop of the path [s]. */
 export const PERIOD = 1.5;
 
+/** Ramp of a drawn path [s]; with it the path is half a ramp late. */
+const RAMP = 0.25;
+
 const number = (value) => {
   const text = String(Number(value.toPrecision(7)));
   return /[.e]/.test(text) ? text : `${text}.0`;
@@ -21,7 +24,7 @@ export function scenario(state, path, given) {
   );
   return [
     `# Written by fivebar page ${given.name}`,
-    `duration = ${number(path.exists ? PERIOD + 0.5 : 4 * PERIOD)} # [s]`,
+    `duration = ${number(path.exists ? PERIOD + 0.45 * RAMP : 4 * PERIOD)} # [s]`,
     "",
     "[leg]",
     ...(given.preset === null ? given.rest : [`preset = "${given.preset}"`]),
@@ -50,6 +53,7 @@ function lines(path) {
   const rows = [...path.points, path.points[0]];
   return [
     'kind = "lines"',
+    `ramp = ${number(RAMP)} # [s], eased in from rest; the run ends just before the foot would stop`,
     `seconds = ${number(PERIOD / path.points.length)} # [s], each`,
     "points = [ # [m]",
     ...rows.map((point) => `    ${pair(point)},`),
