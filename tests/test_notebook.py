@@ -7,13 +7,16 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
+import msgspec
 import numpy as np
 import pytest
+from fivebar_controllers.pd import Pd
 from matplotlib.figure import Figure
 
 from fivebar_sim import FiveBar, Result, Scenario, rollout, run
 from fivebar_sim.errors import ArgumentError, RunDirectoryError
 from fivebar_sim.files import resources
+from fivebar_sim.paths import Ellipse
 from fivebar_sim.report import look, notebook
 from fivebar_sim.report.draw import Drawn
 
@@ -30,6 +33,16 @@ def test_repr_of_a_leg_makes_the_leg(preset: str) -> None:
     assert eval(repr(leg), {"FiveBar": FiveBar}) == leg
     assert repr(FiveBar(L2=0.07)) == "FiveBar(L2=0.07)"
     assert repr(FiveBar()) == "FiveBar()"
+
+
+def test_leg_and_path_make_a_scenario() -> None:
+    path = Ellipse(centre=(0.0, -0.072), radii=(0.02, 0.008), frequency=2.0, ramp=0.25)
+    shipped = Scenario.load("classic-ellipse", ["limits={}"])
+    plain = Scenario(leg=FiveBar(name="classic"), path=path)
+    assert msgspec.structs.replace(plain, name=shipped.name) == shipped
+    assert Scenario(leg=FiveBar(), path=path, controller=Pd()).controller_name == "pd"
+    table = plain.table()
+    assert Scenario.from_table(table, "again", Path()) == plain
 
 
 def test_html_has_verdict_metrics_and_leg(result: Result, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -13,7 +13,7 @@ import tomli_w
 
 from fivebar_sim import paths
 from fivebar_sim.arrays import Array
-from fivebar_sim.control import Feedback, Setpoints, name_of
+from fivebar_sim.control import Feedback, Setpoints, find, name_of
 from fivebar_sim.control.sensors import Sensors
 from fivebar_sim.control.servo import Servo
 from fivebar_sim.errors import ArgumentError, ConfigError, unknown
@@ -39,14 +39,14 @@ KEYS = (
 
 
 class Scenario(msgspec.Struct, frozen=True, kw_only=True):
-    """One run, ready to be simulated.
+    """One run, ready to be simulated: Scenario(leg=leg, path=path) needs no more than these two.
 
     Attributes:
         name: Name of the run directory.
         leg: The leg.
         path: The foot's path.
         controller: What drives the motors: plans all setpoints, or is asked at every control step.
-        controller_name: Its name in the entry-point group.
+        controller_name: Its name in the entry-point group; "" for the one that it has there.
         scene: What the leg hangs on and stands on.
         duration: Length of the run [s].
         force: Force of the world on the foot: applied in the scene "payload", and expected by the
@@ -60,11 +60,11 @@ class Scenario(msgspec.Struct, frozen=True, kw_only=True):
             metrics that `fivebar converge` would refuse.
     """
 
-    name: str
+    name: str = "scenario"
     leg: FiveBar
     path: FootPath
-    controller: Setpoints | Feedback
-    controller_name: str
+    controller: Setpoints | Feedback = msgspec.field(default_factory=lambda: find("servo")())
+    controller_name: str = ""
     scene: Scene = Air()
     duration: float = 4.0
     force: FootForce | None = None
@@ -74,6 +74,10 @@ class Scenario(msgspec.Struct, frozen=True, kw_only=True):
     guards: Guards = Guards()
     limits: dict[str, tuple[float, float]] = {}
     converge: dict[str, float] = {}
+
+    def __post_init__(self) -> None:
+        if not self.controller_name:
+            msgspec.structs.force_setattr(self, "controller_name", name_of(self.controller))
 
     @property
     def words(self) -> str:
@@ -313,8 +317,7 @@ def check_window(scenario: Scenario, where: str) -> None:
     if not scenario.steps * h <= path.end * (1.0 + 1e-9):
         raise ConfigError(f"{where}: duration must be at most the path's {path.end:g} s, {came}")
 
-    force = scenario.force
-    if force is not None and not scenario.steps * h <= force.end * (1.0 + 1e-9):
+    if (force := scenario.force) and not scenario.steps * h <= force.end * (1.0 + 1e-9):
         raise ConfigError(f"{where}: duration must be at most the force's {force.end:g} s, {came}")
 
     # Asked only for their checks: no bus is faster than the timestep, or rounded to another one.
@@ -360,11 +363,10 @@ def _check_scene(scenario: Scenario, where: str) -> None:
     """Raise unless the scene has what path, force and limits need."""
     scene = scenario.scene
     grounded = isinstance(scenario.scene, Ground)
-    kind = scenario.path.__struct_config__.tag
     if scenario.path.needs_ground and not grounded:
         raise ConfigError(
-            f"{where}: path.kind {kind!r} needs a ground: scene must be rail or treadmill, "
-            f"got {scene.kind!r}"
+            f"{where}: path.kind {scenario.path.__struct_config__.tag!r} needs a ground: "
+            f"scene must be rail or treadmill, got {scene.kind!r}"
         )
     if isinstance(scene, Air) and scenario.force is not None:
         raise ConfigError(f"{where}: [force] has no effect in scene 'air': choose another scene")
