@@ -305,7 +305,7 @@ def test_name_that_is_no_file_name_is_refused(tmp_path: Path, name: str) -> None
         ("controller=servo", "controller must be a table, got 'servo'"),
         ("controller.name=servoo", "controller.name: unknown controller 'servoo'; known: computed"),
         ("controller.name={}", "controller.name: unknown controller '{}'; known: computed"),
-        ("controller.gain=1", "[controller]: unknown key 'gain'; known: feedforward"),
+        ("controller.gain=1", "[controller]: unknown key 'gain'; known: arithmetic, feedforward"),
         ("controller.feedforward=all", "controller.feedforward must be one of 'none', 'velocity'"),
         ("limits.tracking.rm=1", "[limits]: unknown key 'tracking.rm'; known: branch.flips,"),
         ("limits.tracking.rms=[1,0]", "limits.tracking.rms must be an upper bound or [low, high]"),
