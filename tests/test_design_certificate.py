@@ -13,7 +13,7 @@ from fivebar_sim import FiveBar, design, kinematics
 from fivebar_sim.analysis import quality, singularity
 from fivebar_sim.arrays import Array
 from fivebar_sim.design.certificate import interval, stretches
-from fivebar_sim.design.certificate.bounds import bounds
+from fivebar_sim.design.certificate.bounds import bounds, end_cosine
 from fivebar_sim.design.certificate.certify import certify, certify_motion, certify_region
 from fivebar_sim.design.certificate.interval import Interval
 from fivebar_sim.design.task.motions import Box, FootMotion, HalfDisc
@@ -130,6 +130,23 @@ def test_bounds_hold_in_every_box(rng: np.random.Generator, leg: FiveBar) -> Non
         assert np.all(sure.condition[reached][known] >= condition[known] * (1.0 - 1e-9))
     assert np.mean(np.isfinite(sure.condition)) > 0.2
     assert np.mean(sure.reach > 0.0) > 0.2
+
+
+def test_cosine_at_the_far_end_is_least_within(rng: np.random.Generator) -> None:
+    """Where the far link is the longer one its angle is widest at some distance, not at an end."""
+    near = rng.uniform(0.02, 0.05, 200)
+    far = near * rng.uniform(0.8, 2.0, 200)
+    turn = np.sqrt(np.maximum(far**2 - near**2, 0.0))
+    low = np.maximum(turn * rng.uniform(0.8, 1.02, 200), np.abs(near - far))
+    high = np.minimum(np.maximum(turn * rng.uniform(1.0, 1.3, 200), 1.01 * low), near + far)
+    got = end_cosine(Interval(low, high), Interval.of(near), Interval.of(far))
+    for share in np.linspace(0.0, 1.0, 41):
+        d = (low + share * (high - low)).astype(np.longdouble)
+        cosine = (d**2 + np.longdouble(far) ** 2 - np.longdouble(near) ** 2) / (2.0 * d * far)
+        # At the very edge of reach the distance was rounded, and the angle may not exist.
+        cosine = np.clip(cosine, -1.0, 1.0)
+        assert np.all((got.low <= cosine) & (cosine <= got.high))
+    assert np.sum((low < turn) & (turn < high)) > 50
 
 
 def kinds(folder: Path) -> list[FootPath]:

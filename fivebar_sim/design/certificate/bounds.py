@@ -108,8 +108,8 @@ def _side(x: Interval, z: Interval, near: Interval, far: Interval, s: int) -> _S
 
     at_knee = ((square(near) + square(far) - d2) / (2.0 * near * far)).clipped(-1.0, 1.0)
     alpha = _seen(x, z)
-    gamma = arccosine(_end_cosine(d, near, far))
-    beta = arccosine(_end_cosine(d, far, near))
+    gamma = arccosine(end_cosine(d, near, far))
+    beta = arccosine(end_cosine(d, far, near))
     return _Side(
         slack=slack,
         cosine=at_knee,
@@ -119,7 +119,7 @@ def _side(x: Interval, z: Interval, near: Interval, far: Interval, s: int) -> _S
     )
 
 
-def _end_cosine(d: Interval, near: Interval, far: Interval) -> Interval:
+def end_cosine(d: Interval, near: Interval, far: Interval) -> Interval:
     """Return the cosine of the angle between the link `far` and the line to the motor.
 
     (d + k / d) / (2 far), k = far^2 - near^2, which is least at d = sqrt(k) where k > 0.
