@@ -236,8 +236,8 @@ def test_unknown_option_points_to_the_help_of_its_command(shell: Shell) -> None:
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        ([], r"no command; known: check, converge, .*workspace"),
-        ([""], r"no command; known: check, converge, .*workspace"),
+        ([], r"no command; known: certify, check, .*workspace"),
+        ([""], r"no command; known: certify, check, .*workspace"),
         (["rnu"], r"unknown command 'rnu'; known: .* \(did you mean 'run'\?\)"),
         (["RUN", "short.toml"], r"unknown command 'RUN'; known: .* \(did you mean 'run'\?\)"),
         (["--quiet", "run"], r"unknown command '--quiet'; known: .*workspace"),

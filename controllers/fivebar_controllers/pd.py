@@ -34,10 +34,10 @@ class Pd(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     Attributes:
         kp: Position gain of each motor [N m/rad].
         kd: Derivative gain [N m s/rad].
-        kp_opening: Position gain of the leg's opening, half the difference of the motors' angles;
-            kp is then that of its direction, their mean. None: kp for both, so that each motor has
-            its own angle alone.
-        kd_opening: Derivative gain of the same; None: kd.
+        kp_opening: Position gain of the leg's opening, half the difference of the motors' angles
+            [N m/rad]; kp is then that of its direction, their mean. None: kp for both, so that each
+            motor has its own angle alone.
+        kd_opening: Derivative gain of the same [N m s/rad]; None: kd.
         derivative: Whether kd acts on the measured rate or on the rate's error.
         period: Time between two commands T [s].
     """

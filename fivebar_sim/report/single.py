@@ -6,7 +6,6 @@ import shlex
 from typing import Any
 
 import msgspec
-import tomli_w
 
 from fivebar_sim import units
 from fivebar_sim.checks import is_finite
@@ -17,6 +16,7 @@ from fivebar_sim.metrics.limits import bounds, look_up
 from fivebar_sim.report import html, in_plane, motors, numbers, over_time
 from fivebar_sim.report.draw import Drawn
 from fivebar_sim.report.html import plain, text
+from fivebar_sim.runs import directory
 from fivebar_sim.runs.side_by_side import when
 from fivebar_sim.runs.stored import StoredRun
 from fivebar_sim.scenario.leg_words import leg_words
@@ -245,5 +245,5 @@ def what(run: StoredRun) -> list[str]:
         f"<pre><code>{html.escape(again)}</code></pre>",
         html.table("Where the numbers come from.", ("", ""), rows),
         "<p>The scenario with all defaults, scenario.toml:</p>",
-        f'<pre tabindex="0"><code>{html.escape(tomli_w.dumps(run.scenario.table()))}</code></pre>',
+        f'<pre tabindex="0"><code>{html.escape(directory.as_toml(run.scenario))}</code></pre>',
     ]

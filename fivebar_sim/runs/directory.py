@@ -166,7 +166,7 @@ def check_run(path: Path) -> None:
         raise RunDirectoryError(f"{path} is not a run directory: {what}")
 
 
-def _with_units(scenario: Any) -> str:
+def as_toml(scenario: Any) -> str:
     """Return a resolved scenario as TOML, with the units of its keys as comments."""
     parts = {name: getattr(scenario, name, None) for name in TABLES}
     kinds = {name: type(part) for name, part in parts.items() if part is not None}
@@ -176,7 +176,7 @@ def _with_units(scenario: Any) -> str:
 def _fill(stage: Path, result: rrd.Run) -> None:
     """Write the files of a run into an empty directory."""
     scenario = result.scenario
-    (stage / "scenario.toml").write_text(_with_units(scenario), encoding="utf-8")
+    (stage / "scenario.toml").write_text(as_toml(scenario), encoding="utf-8")
     for name, content in scenario.files.items():
         (stage / name).write_bytes(content)
     text = json.dumps(result.measured.table, indent=2, allow_nan=False)
