@@ -117,8 +117,15 @@ def _words(task: Task, shown: Shown, k: int) -> str:
         for name, value in zip(task.objectives, shown.objectives[k], strict=True)
     ]
     settings = task.settings(shown.values[k])
-    told += [f"{name} = {html.plain(settings[name])}" for name in task.names]
+    told += [_setting(name, settings[name]) for name in task.names]
     return ", ".join(told)
+
+
+def _setting(name: str, value: Any) -> str:
+    """Return what a variable is set to, with the unit of a length."""
+    if name.startswith("leg.L"):
+        return f"{name} {amount(float(value), 'm')}"
+    return f"{name} = {html.plain(value)}"
 
 
 def _fronts(study: Study, shown: Shown) -> str:

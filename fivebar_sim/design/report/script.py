@@ -25,7 +25,7 @@ text.left { text-anchor: end; }
 .chain.A { stroke: var(--A); } .chain.E { stroke: var(--E); }
 .joint { fill: var(--paper); stroke-width: 2; }
 .joint.A { stroke: var(--A); } .joint.E { stroke: var(--E); }
-th small { display: block; color: var(--muted); }
+th small, td small { display: block; color: var(--muted); }
 @media (min-width: 40rem) { thead .number { white-space: nowrap; } }
 .told { display: none; } .told.on { display: block; }
 .wide svg { display: block; }
