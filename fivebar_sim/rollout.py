@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, overload
 
 import numpy as np
 
@@ -214,6 +214,12 @@ class Kind(NamedTuple):
         )
 
 
+# A robot's scenario is one of a kind of its own: who has it as a mere Scenario is told of a leg's
+# plan, which nearly everybody has.
+@overload
+def plan(scenario: RobotScenario) -> RobotPlan: ...  # pyright: ignore[reportOverlappingOverload]
+@overload
+def plan(scenario: Scenario) -> Plan: ...
 def plan(scenario: Scenario) -> AnyPlan:
     """Return the plan of a scenario, without simulating anything.
 

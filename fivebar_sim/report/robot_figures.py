@@ -201,8 +201,8 @@ def errors(run: StoredRun) -> Drawn:
     figure, (ax,) = draw.panels(1, height=2.9)
     lines = {leg: 1e3 * tracking_error(of_leg(run.record, leg)) for leg in LEGS}
 
-    for leg, values in lines.items():
-        draw.line(ax, run.record["time"], values, NAMED[leg], label=leg)
+    for leg in LEGS:
+        draw.line(ax, run.record["time"], lines[leg], NAMED[leg], label=leg)
     draw.shade_unmeasured(ax, run)
     window = run.scenario.window
     top = draw.ceiling(np.concatenate([line[window] for line in lines.values()]))
