@@ -20,6 +20,8 @@ ROOT = Path(__file__).resolve().parents[1]
 ALLOWED = {
     "fivebar_sim/render/palette.py": "the palette",
     "fivebar_sim/report/look.py": "paper, and what lies behind the lines",
+    "fivebar_sim/page/compose.py": "what lies behind the lines of the page of a leg",
+    "fivebar_sim/report/notebook/show.py": "the words of a verdict, on any notebook's paper",
     "fivebar_sim/report/workspace_map.py": "the ground of a map, behind the lines",
     "fivebar_sim/recording/web.py": "the page around Rerun's viewer",
 }

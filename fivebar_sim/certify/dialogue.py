@@ -13,8 +13,10 @@ import os
 import selectors
 import signal
 import subprocess
+import threading
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from typing import IO, NamedTuple
 
 from fivebar_sim.errors import ConfigError
@@ -124,22 +126,13 @@ def ask(
         ConfigError: The program cannot be started.
     """
     data = "".join(f"{line}\n" for line in questions).encode()
-    try:
-        # A group of its own, so that it can be stopped with all that it starts.
-        process = subprocess.Popen(
-            list(command),
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            start_new_session=True,
-            env=environment,
-        )
-    except (OSError, ValueError) as error:
-        why = getattr(error, "strerror", None) or error
-        raise ConfigError(f"cannot start {command[0]}: {why}") from None
+    with _noted() as came:
+        process = _start(command, environment)
+        pipes = _Pipes(process, data)
 
-    pipes = _Pipes(process, data)
     try:
+        for number in came:
+            signal.raise_signal(number)
         ending = _talk(process, pipes, timeout)
     finally:
         _stop(process)
@@ -153,6 +146,47 @@ def ask(
     words = pipes.err.decode(errors="replace").strip().splitlines()
     lines = pipes.out.decode(errors="replace").splitlines()
     return Said(lines, ending, words[-1] if words else "")
+
+
+@contextmanager
+def _noted() -> Iterator[list[int]]:
+    """Within, Ctrl-C and SIGTERM are only noted, and yielded.
+
+    One that came while a program starts would leave it running, since nobody had it yet.
+    """
+    came: list[int] = []
+    before = {}
+    # No other thread may have signal handlers, and none is interrupted.
+    if threading.current_thread() is threading.main_thread():
+        before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+    heard = [number for number, handler in before.items() if handler not in (None, signal.SIG_IGN)]
+
+    for number in heard:
+        signal.signal(number, lambda number, _: came.append(number))
+    try:
+        yield came
+    finally:
+        for number in heard:
+            signal.signal(number, before[number])
+
+
+def _start(
+    command: Sequence[str], environment: Mapping[str, str] | None
+) -> subprocess.Popen[bytes]:
+    """Start a program; ConfigError if that cannot be done."""
+    try:
+        # A group of its own, so that it can be stopped with all that it starts.
+        return subprocess.Popen(
+            list(command),
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            start_new_session=True,
+            env=environment,
+        )
+    except (OSError, ValueError) as error:
+        why = getattr(error, "strerror", None) or error
+        raise ConfigError(f"cannot start {command[0]}: {why}") from None
 
 
 def _talk(process: subprocess.Popen[bytes], pipes: _Pipes, timeout: float) -> str:
