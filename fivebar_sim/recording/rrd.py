@@ -92,11 +92,18 @@ def write(path: Path, runs: Sequence[Run], labels: Sequence[str] = ()) -> None:
         RerunDisabledError: The environment variable RERUN switches Rerun off.
     """
     names = list(labels) or [run.scenario.name for run in runs]
+    with file_of(path, names) as stream:
+        _send(stream, runs, names)
+
+
+@contextmanager
+def file_of(path: Path, names: Sequence[str]) -> Iterator[rr.RecordingStream]:
+    """Within, what is sent to the stream goes into a .rrd file, which is gone if that fails."""
     with session():
         stream = started(" + ".join(names))
         try:
             with path.open("wb") as file, file_stream.into(stream, file):
-                _send(stream, runs, names)
+                yield stream
         except BaseException:
             # Half a recording helps nobody; a device is no file.
             if path.is_file():

@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from fivebar_sim.arrays import Array
-from fivebar_sim.files import file_stream
 from fivebar_sim.metrics.columns import Record
 from fivebar_sim.recording import foot, layout, rrd
 from fivebar_sim.recording import leg as legs
@@ -47,16 +46,8 @@ TURNED = (0.0, 0.0, 1.0, 0.0)
 def write(path: Path, runs: Sequence[rrd.Run], labels: Sequence[str] = ()) -> None:
     """Write the recording of one or more robots' runs to a .rrd file; see `rrd.write`."""
     names = list(labels) or [run.scenario.name for run in runs]
-    with rrd.session():
-        stream = rrd.started(" + ".join(names))
-        try:
-            with path.open("wb") as file, file_stream.into(stream, file):
-                _send(stream, runs, names)
-        except BaseException:
-            # Half a recording helps nobody; a device is no file.
-            if path.is_file():
-                path.unlink()
-            raise
+    with rrd.file_of(path, names) as stream:
+        _send(stream, runs, names)
 
 
 def _send(stream: rr.RecordingStream, runs: Sequence[rrd.Run], names: list[str]) -> None:
