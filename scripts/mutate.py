@@ -92,7 +92,7 @@ def copy(room: Room, folder: Path) -> None:
 
     slow = [f"--deselect={test}" for test in SLOW]
     # mutmut runs pytest in its own process, which finds the plugin next to mutate_operators.py.
-    options = ["-p", "no:cacheprovider", "-p", "mutate_cold", "-m", "not long", *slow]
+    options = ["-p", "no:cacheprovider", "-p", "mutate_cold", "-m", "not long and not site", *slow]
     config = CONFIG.format(
         files=json.dumps(room.files),
         copied=json.dumps([name for name in COPIED if name != "fivebar_sim"]),

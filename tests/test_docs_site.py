@@ -1,7 +1,8 @@
 """The built documentation site: it builds without a warning, and asks nothing of other hosts.
 
-The test in a browser needs Chromium and Playwright's Python package; FIVEBAR_BROWSER=required makes
-their lack an error.
+FIVEBAR_SITE names the site that ./scripts/docs has built; without it these tests build it, which
+takes longer than they do. The test in a browser needs Chromium and Playwright's Python package;
+FIVEBAR_BROWSER=required makes their lack an error.
 """
 
 from __future__ import annotations
@@ -61,13 +62,17 @@ def test_what_a_page_loads_is_seen() -> None:
 
 @pytest.fixture(scope="module")
 def site() -> Path:
-    """Return the folder of the site, built anew."""
+    """Return the folder of the site, built anew unless it is given."""
+    given = os.environ.get("FIVEBAR_SITE")
+    if given is not None:
+        return Path(given).resolve()
     command = [sys.executable, str(ROOT / "scripts" / "build_docs.py")]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     return ROOT / "build" / "site"
 
 
+@pytest.mark.site
 def test_pages_load_nothing_from_other_hosts(site: Path) -> None:
     pages = list(site.rglob("*.html"))
     assert len(pages) > 30
@@ -78,6 +83,7 @@ def test_pages_load_nothing_from_other_hosts(site: Path) -> None:
         assert "@import" not in sheet.read_text()
 
 
+@pytest.mark.site
 @pytest.mark.parametrize("room", ROOMS)
 def test_all_exports_are_in_the_reference(site: Path, room: str) -> None:
     """A re-exported name that the generator leaves out would go unnoticed."""
@@ -110,6 +116,7 @@ def address(site: Path) -> Iterator[str]:
         server.shutdown()
 
 
+@pytest.mark.site
 def test_a_browser_asks_no_other_host(address: str) -> None:
     lack = importlib.util.find_spec("playwright") is None or shutil.which("chromium") is None
     if lack and os.environ.get("FIVEBAR_BROWSER") == "required":
