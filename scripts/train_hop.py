@@ -1,8 +1,9 @@
 """./.venv/bin/python scripts/train_hop.py [--generations 40] [--seed 0]: learns to hop in a minute.
 
 64 legs of the vector environment try a policy each, and CMA-ES makes the next 64 of what came of
-them. Prints the generations and what the trained policy does beside random setpoints and beside the
-hop path of the scenario rail-hop, the tables of docs/environments.md; draws docs/hop-training.svg.
+them. With --ray HOST:PORT they do so on a Ray cluster, with the same numbers. Prints the
+generations and what the trained policy does beside random setpoints and beside the hop path of the
+scenario rail-hop, the tables of docs/environments.md; draws docs/hop-training.svg.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ from __future__ import annotations
 import argparse
 import time
 from collections.abc import Callable, Iterator
+from contextlib import ExitStack
 from pathlib import Path
 from typing import NamedTuple
 
@@ -20,13 +22,17 @@ from fivebar_controllers.servo import Servo as PathServo
 from fivebar_sim import motion
 from fivebar_sim.arrays import Array
 from fivebar_sim.control.servo import Servo
+from fivebar_sim.errors import FiveBarError
 from fivebar_sim.scenario import Scenario
 from fivebar_sim.tasks import Hop
 from fivebar_sim.tasks.base import clock_hand
 from fivebar_sim.vector import LegVectorEnv
+from fivebar_sim.workers.cluster import RayCluster
+from fivebar_sim.workers.here import Here, Workers
 
 OUT = Path(__file__).resolve().parent.parent / "docs" / "hop-training.svg"
 LEGS = 64
+BLOCK = 8  # legs that a processor of a cluster plays
 THREADS = 2
 HARMONICS = 4
 WEIGHTS = 2 * (2 * HARMONICS + 1)
@@ -216,16 +222,61 @@ class Generation(NamedTuple):
     mean: Array
 
 
-def train(generations: int, seed: int, duration: float = TRAINED) -> Iterator[Generation]:
-    """Yield the generations; within one all start in the same pose, in the next in another."""
-    legs = LegVectorEnv("hop", LEGS, nthread=THREADS, duration=duration, servo=SERVO)
+class Trial(NamedTuple):
+    """What legs are to try: the task that a worker does.
+
+    Attributes:
+        weights: The policies, one a leg, (n, WEIGHTS).
+        seed: Of the pose in which all of them start.
+        duration: Of the episode [s].
+    """
+
+    weights: Array
+    seed: int
+    duration: float
+
+
+def tried(trial: Trial) -> tuple[Array, Array]:
+    """Return how good policies are, and how high the foot came with each [m], (n,)."""
+    n = len(trial.weights)
+    legs = LegVectorEnv("hop", n, nthread=THREADS, duration=trial.duration, servo=SERVO)
+    played = play(legs, policies(legs, trial.weights), [trial.seed] * n)
+    return played.reward - EXCESS * excess(legs, trial.weights), played.foot
+
+
+def train(
+    generations: int,
+    seed: int,
+    duration: float = TRAINED,
+    workers: Workers | None = None,
+) -> Iterator[Generation]:
+    """Yield the generations; within one all start in the same pose, in the next in another.
+
+    Args:
+        generations: How many.
+        seed: Of the search, and of the first pose.
+        duration: Of an episode [s].
+        workers: Who plays `BLOCK` legs at a time; this process plays all at once (None). A leg
+            does the same beside any others, so the numbers are the same.
+    """
     search = Cma(WEIGHTS, LEGS, SIGMA, np.random.default_rng(seed))
+    block = LEGS if workers is None else BLOCK
+    doing = workers or Here()
+
     for age in range(generations):
         weights = search.ask()
-        played = play(legs, policies(legs, weights), [seed + age] * LEGS)
-        fitness = played.reward - EXCESS * excess(legs, weights)
+        trials = [
+            (first, Trial(weights[first : first + block], seed + age, duration))
+            for first in range(0, LEGS, block)
+        ]
+        fitness = np.zeros(LEGS)
+        height = np.zeros(LEGS)
+        for first, (found, foot) in doing.results(tried, trials):
+            fitness[first : first + block] = found
+            height[first : first + block] = foot
+
         search.tell(fitness)
-        foot = float(played.foot[np.argmax(fitness)])
+        foot = float(height[np.argmax(fitness)])
         best = float(fitness.max())
         average = float(fitness.mean())
         yield Generation(best, average, foot, search.sigma, search.mean)
@@ -301,23 +352,45 @@ def draw(found: list[Generation], shown: dict[str, Played], out: Path) -> None:
     figure.savefig(out, metadata={"Date": None})
 
 
+def trained(generations: int, seed: int, ray: str | None) -> list[Generation]:
+    """Return the generations, and print some of them.
+
+    Args:
+        generations: How many.
+        seed: Of the search.
+        ray: HOST:PORT of a Ray cluster whose processors play; this process (None).
+
+    Raises:
+        FiveBarError: There is no cluster, or it is lost.
+    """
+    found = list[Generation]()
+    with ExitStack() as stack:
+        cluster = None if ray is None else stack.enter_context(RayCluster(ray).connected())
+        print("generation  best   mean   foot of the best   step size")
+
+        for each in train(generations, seed, workers=cluster):
+            found.append(each)
+            if len(found) % 5 == 0 or len(found) == 1:
+                print(
+                    f"{len(found):10d}{each.best:6.3f}{each.average:7.3f}"
+                    f"{1e3 * each.foot:14.1f} mm{each.sigma:14.3f} rad"
+                )
+
+    return found
+
+
 def main() -> None:
     """Train, print and draw."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--generations", type=int, default=40)
     parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--ray", metavar="HOST:PORT", help="play on this Ray cluster")
     chosen = parser.parse_args()
-    found = list[Generation]()
     start = time.perf_counter()
-    print("generation  best   mean   foot of the best   step size")
-
-    for each in train(chosen.generations, chosen.seed):
-        found.append(each)
-        if len(found) % 5 == 0 or len(found) == 1:
-            print(
-                f"{len(found):10d}{each.best:6.3f}{each.average:7.3f}"
-                f"{1e3 * each.foot:14.1f} mm{each.sigma:14.3f} rad"
-            )
+    try:
+        found = trained(chosen.generations, chosen.seed, chosen.ray)
+    except FiveBarError as error:
+        parser.exit(2, f"error: {error}\n")
 
     print(f"trained in {time.perf_counter() - start:.0f} s")
     shown = show(found[-1].mean)

@@ -213,6 +213,24 @@ def nodes(address: str) -> int:
     return int(found[1]) if found else 0
 
 
+@contextmanager
+def two_nodes(folder: Path) -> Iterator[str]:
+    """Start a cluster of two nodes of one processor, and yield its address."""
+    with socket.create_server((HEAD, 0)) as listening:
+        port = listening.getsockname()[1]
+    address = f"{HEAD}:{port}"
+    with ExitStack() as stack:
+        head = ("--head", f"--node-ip-address={HEAD}", f"--port={port}")
+        # Its sockets are in there, and their names may have 107 bytes.
+        short = stack.enter_context(tempfile.TemporaryDirectory(prefix="ray"))
+        more = ("--include-dashboard=false", f"--temp-dir={short}")
+        up = lambda: answers(address) and nodes(address) == 1  # noqa: E731
+        stack.enter_context(node(folder, up, *head, *more))
+        second = (f"--address={address}", f"--node-ip-address={NODE}")
+        stack.enter_context(node(folder, lambda: nodes(address) == 2, *second))
+        yield address
+
+
 @pytest.mark.long
 @WITH_RAY
 @pytest.mark.skipif(sys.platform != "linux", reason="looks in /proc for the node")
@@ -222,21 +240,10 @@ def test_cluster_that_loses_a_node_gives_the_same_bytes(
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("RAY_USAGE_STATS_ENABLED", "0")
     (tmp_path / "short.toml").write_text(JUDGED, encoding="utf-8")
-    with socket.create_server((HEAD, 0)) as listening:
-        address = f"{HEAD}:{listening.getsockname()[1]}"
     command = [sys.executable, "-m", "fivebar_sim", "sweep", "short.toml", "--out"]
     vary = ["--vary", "leg.L2=0.05:0.07:400"]
 
-    with ExitStack() as stack:
-        port = address.rpartition(":")[2]
-        head = ("--head", f"--node-ip-address={HEAD}", f"--port={port}")
-        # Its sockets are in there, and their names may have 107 bytes.
-        short = stack.enter_context(tempfile.TemporaryDirectory(prefix="ray"))
-        more = ("--include-dashboard=false", f"--temp-dir={short}")
-        up = lambda: answers(address) and nodes(address) == 1  # noqa: E731
-        stack.enter_context(node(tmp_path, up, *head, *more))
-        second = (f"--address={address}", f"--node-ip-address={NODE}")
-        stack.enter_context(node(tmp_path, lambda: nodes(address) == 2, *second))
+    with two_nodes(tmp_path) as address:
         run = subprocess.Popen([*command, "there", *vary, "--ray", address], stdout=subprocess.PIPE)
         blocks = tmp_path / "there" / "blocks"
         wait_for(lambda: blocks.is_dir() and len(list(blocks.glob("0*"))) >= 4)
@@ -251,3 +258,42 @@ def test_cluster_that_loses_a_node_gives_the_same_bytes(
     subprocess.run([*command, "here", *vary], check=True, capture_output=True)
     there, here = (tmp_path / name / "runs.parquet" for name in ("there", "here"))
     assert there.read_bytes() == here.read_bytes()
+
+
+TRAINING = """
+import runpy, sys
+from fivebar_sim.workers.cluster import RayCluster
+script = runpy.run_path(sys.argv[1])
+def generations(workers):
+    for each in script["train"](20, 0, duration=0.2, workers=workers):
+        print(*each[:4], *each.mean, flush=True)
+if sys.argv[2:]:
+    with RayCluster(sys.argv[2]).connected() as cluster:
+        generations(cluster)
+else:
+    generations(None)
+"""
+
+
+@pytest.mark.long
+@WITH_RAY
+@pytest.mark.skipif(sys.platform != "linux", reason="looks in /proc for the node")
+def test_training_on_a_cluster_that_loses_a_node_gives_the_same_numbers(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of the script: its own functions go to the nodes along with their tasks."""
+    monkeypatch.setenv("RAY_USAGE_STATS_ENABLED", "0")
+    script = Path(__file__).parents[1] / "scripts" / "train_hop.py"
+    command = [sys.executable, "-c", TRAINING, str(script)]
+
+    with two_nodes(tmp_path) as address:
+        with subprocess.Popen([*command, address], stdout=subprocess.PIPE, text=True) as run:
+            assert run.stdout is not None
+            there = [run.stdout.readline()]
+            os.kill(raylet(NODE), signal.SIGKILL)
+            there += run.stdout.readlines()
+        assert run.returncode == 0
+
+    here = subprocess.run(command, check=True, capture_output=True, text=True).stdout
+    assert "".join(there) == here
+    assert len(there) == 20

@@ -115,8 +115,19 @@ class RayCluster:
         Raises:
             WorkersError: The cluster is gone, has other versions, or loses a task again and again.
         """
+        # Ray sends a script's own function along; the nodes import those of modules.
         with _connected(self.address) as cluster:
             yield from drained(cluster, function, iter(tasks))
+
+    @contextmanager
+    def connected(self) -> Iterator[RayCluster]:
+        """Stay connected within: for `results` again and again, which each connect for themselves.
+
+        Raises:
+            WorkersError: The cluster refuses the connection.
+        """
+        with _connected(self.address):
+            yield self
 
 
 def check_address(address: str) -> None:
