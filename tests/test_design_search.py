@@ -6,6 +6,8 @@ import os
 import signal
 import subprocess
 import sys
+import warnings
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -113,6 +115,43 @@ def test_cma_finds_the_best_of_a_grid(tmp_path: Path) -> None:
     assert best <= found <= 1.001 * best
 
 
+CMA = TWO.replace('["torque_peak", "size"]', '["torque_peak"]')
+CMA += 'method = "cma-es"\npopulation = 8\ngenerations = 9'
+
+
+@pytest.fixture
+def light_cma() -> Iterator[None]:
+    """Import cma without what it draws and fits with: that takes it 3 s, and searches need none."""
+    with pytest.MonkeyPatch.context() as patch, warnings.catch_warnings():
+        warnings.filterwarnings("ignore", "Could not import matplotlib")
+        for name in [n for n in sys.modules if n.partition(".")[0] == "cma"]:
+            patch.delitem(sys.modules, name)
+        for name in ("matplotlib", "matplotlib.pyplot", "scipy.stats"):
+            patch.setitem(sys.modules, name, None)
+        yield
+        for name in [n for n in sys.modules if n.partition(".")[0] == "cma"]:
+            del sys.modules[name]
+
+
+@pytest.mark.usefixtures("light_cma")
+def test_cma_that_is_ended_goes_on(tmp_path: Path) -> None:
+    """Its step size and its covariance are not kept: they come again from what it was told."""
+    task = load(tmp_path, CMA)
+    search(task, tmp_path / "whole")
+    for blocks in (1, 5, 8):
+        ended = tmp_path / f"ended-{blocks}"
+
+        def stop(progress: Progress, last: int = blocks) -> None:
+            if progress.blocks == last:
+                raise KeyboardInterrupt
+
+        with pytest.raises(KeyboardInterrupt):
+            search(task, ended, watch=stop)
+        again = search(task, ended)
+        assert (again.designs, again.fresh) == (72, 72 - 8 * blocks)
+        assert_same_tables(tmp_path / "whole", ended)
+
+
 @pytest.mark.parametrize(
     "options",
     [
@@ -174,6 +213,16 @@ def test_killed_search_goes_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
     assert (
         front_of(again).designs.objectives.tobytes() == front_of(whole).designs.objectives.tobytes()
     )
+
+
+@pytest.mark.long
+def test_killed_cma_goes_on(tmp_path: Path) -> None:
+    task = load(tmp_path, CMA)
+    command = [sys.executable, "-c", KILLED, task.where, str(tmp_path / "killed")]
+    assert subprocess.run(command, check=False).returncode == -signal.SIGKILL
+    assert search(task, tmp_path / "killed").fresh == 72 - 3 * 8
+    search(task, tmp_path / "whole")
+    assert_same_tables(tmp_path / "whole", tmp_path / "killed")
 
 
 def test_damaged_block_is_evaluated_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
