@@ -18,6 +18,7 @@ from fivebar_sim import design
 from fivebar_sim.design.evaluation.evaluate import evaluate
 from fivebar_sim.design.proof.simulate import Simulated
 from fivebar_sim.design.proof.table import Proof
+from fivebar_sim.design.report import charts, words
 from fivebar_sim.design.report.axes import Axis, amount
 from fivebar_sim.design.report.legs import thinned
 from fivebar_sim.design.report.script import SCRIPT
@@ -98,11 +99,74 @@ def test_page_tells_yield_blame_and_what_to_take(study: Study, page: Page) -> No
     text = re.sub(r"<[^>]*>", "", page.source)
     assert "97.3 % keep to every constraint" in text
     assert "What breaks: reach in 2.7 %" in text
-    assert "torque_peak scatters by 1 %: the printer must get L1 right" in text
-    assert "mass scatters by 1 %, for which no dimension alone is to blame" in text
+    assert "The peak torque scatters by 1 %: the printer must get L1 right" in text
+    assert "The mass scatters by 1 %, for which no dimension alone is to blame" in text
     assert "2 designs in MuJoCo, on the same motions. 1 broke down, the first: broke" in text
     assert "Take this one, best/a-01.toml" in text
     assert f"L1 = {float(study.best[0][0])!r}\n" in text
+
+
+def test_page_has_words_with_units_for_keys(page: Page) -> None:
+    """All but the task itself, which is shown as it is typed."""
+    text = re.sub(r"<[^>]*>", " ", page.source.partition("<pre>leg = ")[0])
+    assert not re.search(r"[a-z]+_[a-z]+|leg\.L", text.partition("The front")[2])
+    (head,) = re.findall(r"<thead>.*built right.*</thead>", page.source)
+    heads = re.findall(r"<th[^>]*>([^<]*)</th>", head)
+    assert heads == ["design", "peak torque", "mass", "built right"]
+    for told in ("peak torque [mN m]", "peak torque ", "L1 "):
+        assert told in text
+
+
+VARIED = """
+leg = "classic"
+objectives = ["mass"]
+[vary]
+leg.L1 = [0.03, 0.05]
+leg.tilt = [0.0, 0.1]
+leg.gravity.1 = [-9.8, -1.6]
+servo = { choice = ["xl330", "hobby-9g"] }
+motion.2.path.centre.1 = [-0.080, -0.070]
+motion.2.payload = [0.0, 0.01]
+motion.2.force.value.1 = [1.0, 2.0]
+region.1.low.0 = [-0.01, 0.0]
+[motion.2]
+payload = 0.01
+path = { kind = "ellipse", centre = [0.0, -0.075], radii = [0.01, 0.006], frequency = 1.0 }
+force = { kind = "constant", value = [0.0, 2.0] }
+[region.1]
+kind = "box"
+low = [-0.01, -0.080]
+high = [0.01, -0.070]
+[search]
+method = "sobol"
+"""
+
+
+def test_variables_have_the_units_of_their_keys(tmp_path: Path) -> None:
+    (tmp_path / "task.toml").write_text(VARIED, "utf-8")
+    task = design.load(tmp_path / "task.toml")
+    shown = {words.short(key): words.unit(task, key) for key in task.names}
+    assert shown == {
+        "L1": "m",
+        "tilt": "rad",
+        "gravity.1": "m/s^2",
+        "servo": "",
+        "2.path.centre.1": "m",
+        "2.payload": "kg",
+        "2.force.value.1": "N",
+        "1.low.0": "m",
+    }
+    assert words.setting(task, "motion.2.path.centre.1", -0.0718) == "2.path.centre.1 -71.8 mm"
+    assert words.setting(task, "servo", "xl330") == "servo xl330"
+    k = task.names.index("servo")
+    assert [word for _, word in words.axis(task, k, np.zeros(3)).ticks()] == ["xl330", "hobby-9g"]
+
+
+def test_long_names_of_axes_go_over_lines_that_do_not_meet() -> None:
+    assert charts.axis_lines("peak torque [mN m]") == ["peak torque", "[mN m]"]
+    assert charts.axis_lines("heat over a serial leg's") == ["heat over a", "serial leg's"]
+    assert charts.axis_lines("walk.path.centre.1 [mm]") == ["walk.path.", "centre.1", "[mm]"]
+    assert charts.axis_lines("gear") == ["gear"]
 
 
 def test_front_of_one_objective_is_drawn_over_a_variable(study: Study, tmp_path: Path) -> None:
@@ -113,7 +177,7 @@ def test_front_of_one_objective_is_drawn_over_a_variable(study: Study, tmp_path:
     only = front.empty(task, found).joined(task, 0, found)
     alone = Study(task, only, only.designs.values[:1], ["best/a.toml"], [""], [], None)
     source = write(alone, tmp_path).read_text("utf-8")
-    assert "mass [g] over leg.L1 [mm] of 1 designs" in source
+    assert "mass [g] over L1 [mm] of 1 designs" in source
     assert "Built a little off" not in source
 
 

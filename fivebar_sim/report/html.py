@@ -37,7 +37,8 @@ figure svg { display: block; width: 100%; max-width: 37rem; height: auto; }
 figcaption, .note { color: var(--muted); font-size: .9rem; max-width: 37rem; }
 .scroll { overflow-x: auto; max-width: 100%; }
 table { border-collapse: collapse; font-variant-numeric: tabular-nums; }
-caption { text-align: left; color: var(--muted); font-size: .9rem; padding-bottom: .25rem; }
+caption { text-align: left; color: var(--muted); font-size: .9rem; padding-bottom: .25rem;
+  max-width: calc(100vw - 2rem); }
 th, td { padding: .2rem .9rem .2rem 0; border-bottom: 1px solid var(--grid); text-align: left;
   vertical-align: top; }
 th { font-weight: 600; overflow-wrap: anywhere; }

@@ -64,6 +64,7 @@ class Objective(NamedTuple):
     """An objective.
 
     Attributes:
+        name: Its name in words.
         unit: SI unit; "" for a pure number.
         sense: +1 where less is better, -1 where more is.
         needs: What a task must have for it: "motion", "limit", "winding".
@@ -71,6 +72,7 @@ class Objective(NamedTuple):
         text: What it is.
     """
 
+    name: str
     unit: str
     sense: int
     needs: tuple[str, ...]
@@ -231,35 +233,84 @@ def _force(found: Found) -> Array:
 
 CATALOGUE: dict[str, Objective] = {
     "torque_peak": Objective(
-        "N m", 1, ("motion",), _torque_peak, "largest torque of either motor in any motion"
+        "peak torque",
+        "N m",
+        1,
+        ("motion",),
+        _torque_peak,
+        "largest torque of either motor in any motion",
     ),
     "torque_rms": Objective(
-        "N m", 1, ("motion",), _torque_rms, "RMS torque of the motor that has more of it"
+        "RMS torque",
+        "N m",
+        1,
+        ("motion",),
+        _torque_rms,
+        "RMS torque of the motor that has more of it",
     ),
-    "heat": Objective("W", 1, ("motion", "winding"), _heat, "copper heat of both motors"),
-    "energy": Objective("J", 1, ("motion",), _energy, "positive work of both motors in a step"),
+    "heat": Objective("heat", "W", 1, ("motion", "winding"), _heat, "copper heat of both motors"),
+    "energy": Objective(
+        "energy a step", "J", 1, ("motion",), _energy, "positive work of both motors in a step"
+    ),
     "balance": Objective(
-        "", 1, ("motion",), _balance, "|2 share_A - 1| of the torque impulse: 0 is evenly shared"
+        "imbalance of A and E",
+        "",
+        1,
+        ("motion",),
+        _balance,
+        "|2 share_A - 1| of the torque impulse: 0 is evenly shared",
     ),
     "antagonism": Objective(
-        "", 1, ("motion",), _antagonism, "copper heat as a multiple of the serial leg's"
+        "heat over a serial leg's",
+        "",
+        1,
+        ("motion",),
+        _antagonism,
+        "copper heat as a multiple of the serial leg's",
     ),
-    "mass": Objective("kg", 1, (), _mass, "mass of the links and the foot"),
-    "size": Objective("m", 1, (), lambda f: f.legs.size[:, 0], "length of the longer side"),
+    "mass": Objective("mass", "kg", 1, (), _mass, "mass of the links and the foot"),
+    "size": Objective(
+        "longer side", "m", 1, (), lambda f: f.legs.size[:, 0], "length of the longer side"
+    ),
     "longest": Objective(
-        "m", 1, (), lambda f: f.legs.longest[:, 0], "longest link, L2 up to the foot"
+        "longest link",
+        "m",
+        1,
+        (),
+        lambda f: f.legs.longest[:, 0],
+        "longest link, L2 up to the foot",
     ),
     "reflected_inertia": Objective(
-        "kg", 1, ("motion",), _reflected, "largest inertia that is felt at the foot"
+        "reflected inertia",
+        "kg",
+        1,
+        ("motion",),
+        _reflected,
+        "largest inertia that is felt at the foot",
     ),
     "force": Objective(
-        "N", -1, ("motion", "limit"), _force, "force at the foot that no direction falls short of"
+        "foot force",
+        "N",
+        -1,
+        ("motion", "limit"),
+        _force,
+        "force at the foot that no direction falls short of",
     ),
     "workspace_area": Objective(
-        "m^2", -1, (), lambda f: reach_area.area(f.legs), "area that the foot reaches"
+        "workspace area",
+        "m^2",
+        -1,
+        (),
+        lambda f: reach_area.area(f.legs),
+        "area that the foot reaches",
     ),
     "condition": Objective(
-        "", 1, (), lambda f: f.worst, "worst condition number of the foot's Jacobian"
+        "condition number",
+        "",
+        1,
+        (),
+        lambda f: f.worst,
+        "worst condition number of the foot's Jacobian",
     ),
 }
 """Every objective by its name."""

@@ -30,12 +30,14 @@ class Axis(NamedTuple):
         scale: Factor from SI to the shown unit.
         low: Least value shown, in that unit.
         high: Greatest value shown.
+        words: What stands at 0, 1, ... instead of numbers; empty for numbers.
     """
 
     label: str
     scale: float
     low: float
     high: float
+    words: tuple[str, ...] = ()
 
     @classmethod
     def of(cls, name: str, unit: str, values: Array, room: float = 0.06) -> Axis:
@@ -49,15 +51,18 @@ class Axis(NamedTuple):
             scale = number / max(abs(low), abs(high))
         # A single value has no span of its own.
         span = (high - low) or abs(high) or 1.0
-        ends = (low - room * span, high + room * span)
-        return cls(f"{name} [{shown}]" if shown else name, scale, *(scale * end for end in ends))
+        least = scale * (low - room * span)
+        most = scale * (high + room * span)
+        return cls(f"{name} [{shown}]" if shown else name, scale, least, most)
 
     def share(self, value: float) -> float:
         """Return where a value in SI units lies between the ends, 0 to 1."""
         return (self.scale * value - self.low) / (self.high - self.low)
 
     def ticks(self, most: int = 5) -> list[tuple[float, str]]:
-        """Return round numbers: where each lies, 0 to 1, and its text."""
+        """Return round numbers, or the words: where each lies, 0 to 1, and its text."""
+        if self.words:
+            return [(self.share(float(k)), word) for k, word in enumerate(self.words)]
         raw = (self.high - self.low) / most
         power = 10.0 ** math.floor(math.log10(raw))
         step = next(m * power for m in (1.0, 2.0, 5.0, 10.0) if m * power >= raw * (1.0 - 1e-9))

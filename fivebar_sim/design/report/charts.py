@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Sequence
 from html import escape
 
@@ -17,6 +18,10 @@ RIGHT = 14.0
 TOP = 14.0
 BOTTOM = 46.0
 """Sizes of a chart, and what its labels take of it."""
+
+LINE = 14.0
+LETTERS = 13
+"""Height of a line of an axis' name, and letters in it, in parallel coordinates."""
 
 
 def scatter(
@@ -63,22 +68,23 @@ def parallel(axes: Sequence[Axis], rows: Sequence[tuple[int, Array, str]], alt: 
     """
     step = 96.0
     width = LEFT + step * (len(axes) - 1) + 70.0
-    top = 44.0
     height = 250.0
+    names = [axis_lines(axis.label) for axis in axes]
+    top = LINE * max(map(len, names)) + 16.0
     parts = []
-    for j, axis in enumerate(axes):
+    # Over the strands, or these hide them.
+    ticks = []
+    for j, (axis, name) in enumerate(zip(axes, names, strict=True)):
         across = LEFT + step * j
-        name, _, unit = axis.label.partition(" [")
-        # Every other name stands higher, so that long ones do not meet.
-        up = top - 12.0 - 14.0 * (j % 2)
-        word = f"{name} [{unit}" if unit else name
-        parts.append(f'<text class="name" x="{across}" y="{up}">{escape(word)}</text>')
+        for k, word in enumerate(reversed(name)):
+            up = top - 12.0 - LINE * k
+            parts.append(f'<text class="name" x="{across}" y="{up}">{escape(word)}</text>')
         parts.append(f'<path class="axis" d="M{across} {top}V{top + height}"/>')
         for part, text in axis.ticks(4):
             down = top + height * (1.0 - part)
             parts.append(f'<path class="axis" d="M{across - 4} {down:.1f}h4"/>')
-            parts.append(
-                f'<text class="tick left" x="{across - 7}" y="{down + 4:.1f}">{text}</text>'
+            ticks.append(
+                f'<text class="tick left" x="{across - 7}" y="{down + 4:.1f}">{escape(text)}</text>'
             )
     for k, values, kind in rows:
         shares = [axis.share(float(v)) for axis, v in zip(axes, values, strict=True)]
@@ -88,7 +94,19 @@ def parallel(axes: Sequence[Axis], rows: Sequence[tuple[int, Array, str]], alt: 
             if np.isfinite(share)
         ]
         parts.append(f'<path class="strand {kind}" data-k="{k}" d="M{"L".join(places)}"/>')
-    return svg(width, top + height + 14.0, alt, parts, fixed=True)
+    return svg(width, top + height + 14.0, alt, [*parts, *ticks], fixed=True)
+
+
+def axis_lines(label: str) -> list[str]:
+    """Return an axis' name in lines that do not meet those of the next axis, then its unit."""
+    name, bracket, unit = label.partition(" [")
+    lines = [""]
+    # Keys of a path's own numbers have dots where words have blanks.
+    for word in re.split(r"(?<=[ ._])", name):
+        if lines[-1] and len(lines[-1] + word.rstrip()) > LETTERS:
+            lines.append("")
+        lines[-1] += word
+    return [line.rstrip() for line in lines] + [f"[{unit}"] * bool(bracket)
 
 
 def _place(x: Axis, y: Axis, px: float, py: float) -> tuple[float, float]:

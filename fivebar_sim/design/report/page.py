@@ -11,7 +11,7 @@ import tomli_w
 from fivebar_sim.arrays import Array
 from fivebar_sim.design.evaluation.objectives import CATALOGUE
 from fivebar_sim.design.proof.table import Proof
-from fivebar_sim.design.report import charts, legs
+from fivebar_sim.design.report import charts, legs, words
 from fivebar_sim.design.report.axes import Axis, amount
 from fivebar_sim.design.report.script import SCRIPT, STYLE
 from fivebar_sim.design.report.study import Study
@@ -101,31 +101,19 @@ def _take(study: Study) -> list[str]:
 
 
 def _axis(name: str, values: Array) -> Axis:
-    return Axis.of(name, CATALOGUE[name].unit, values)
-
-
-def _variable(task: Task, k: int, values: Array) -> Axis:
-    name = task.names[k]
-    unit = "m" if name.startswith("leg.L") else ""
-    return Axis.of(name, unit, values)
+    objective = CATALOGUE[name]
+    return Axis.of(objective.name, objective.unit, values)
 
 
 def _words(task: Task, shown: Shown, k: int) -> str:
     """Return a design in words."""
     told = [
-        f"{name} {amount(float(value), CATALOGUE[name].unit)}"
+        f"{CATALOGUE[name].name} {amount(float(value), CATALOGUE[name].unit)}"
         for name, value in zip(task.objectives, shown.objectives[k], strict=True)
     ]
     settings = task.settings(shown.values[k])
-    told += [_setting(name, settings[name]) for name in task.names]
+    told += [words.setting(task, name, settings[name]) for name in task.names]
     return ", ".join(told)
-
-
-def _setting(name: str, value: Any) -> str:
-    """Return what a variable is set to, with the unit of a length."""
-    if name.startswith("leg.L"):
-        return f"{name} {amount(float(value), 'm')}"
-    return f"{name} = {html.plain(value)}"
 
 
 def _fronts(study: Study, shown: Shown) -> str:
@@ -137,7 +125,7 @@ def _fronts(study: Study, shown: Shown) -> str:
         y = _axis(task.objectives[j], shown.objectives[:, j])
         charted.append((x, y, shown.objectives[:, 0], shown.objectives[:, j]))
     if not charted:
-        along = _variable(task, 0, shown.values[:, 0])
+        along = words.axis(task, 0, shown.values[:, 0])
         charted.append((along, x, shown.values[:, 0], shown.objectives[:, 0]))
 
     figures = []
@@ -165,7 +153,7 @@ def _fronts(study: Study, shown: Shown) -> str:
 
 def _parallel(task: Task, shown: Shown) -> str:
     """Return variables and objectives side by side."""
-    axes = [_variable(task, k, shown.values[:, k]) for k in range(len(task.names))]
+    axes = [words.axis(task, k, shown.values[:, k]) for k in range(len(task.names))]
     axes += [_axis(name, shown.objectives[:, k]) for k, name in enumerate(task.objectives)]
     numbers = np.concatenate([shown.values, shown.objectives], axis=1)
     rows = [(k, numbers[k], shown.kind(k)) for k in reversed(range(len(numbers)))]
@@ -177,7 +165,8 @@ def _parallel(task: Task, shown: Shown) -> str:
 def _best(study: Study, shown: Shown) -> str:
     """Return the table of the best designs."""
     task = study.task
-    head = ["design", *task.objectives, *(["built right"] * bool(study.built))]
+    named = [CATALOGUE[name].name for name in task.objectives]
+    head = ["design", *named, *(["built right"] * bool(study.built))]
     rows = []
     for k in range(shown.best):
         numbers = [
@@ -185,8 +174,8 @@ def _best(study: Study, shown: Shown) -> str:
             for name, value in zip(task.objectives, shown.objectives[k], strict=True)
         ]
         made = [f"{100.0 * study.built[k].made.share:.1f} %"] if study.built else []
-        named = Cell(f"{text(study.presets[k])}<small>{text(study.sure[k])}</small>")
-        rows.append([named, *numbers, *made])
+        preset = Cell(f"{text(study.presets[k])}<small>{text(study.sure[k])}</small>")
+        rows.append([preset, *numbers, *made])
     table = html.table("The best designs, as presets.", head, rows, stacked=True)
     # A row answers to the pointer as a point of the chart does.
     top, *bodies = table.split("<tr>")
@@ -211,10 +200,14 @@ def _robust(study: Study) -> str:
         said.append(f"<p class='note'>{text(built.why)}</p>")
     for each in built.sensitivities:
         if each.spread > 0.0:
-            said.append(f"<p>{text(each.objective)} {_blame(each)}.</p>")
+            said.append(f"<p>The {text(_named(each))} {_blame(each)}.</p>")
     if built.sensitivities:
         said.append(_bars(built.sensitivities))
     return html.section("Built a little off", *said)
+
+
+def _named(found: Sensitivity) -> str:
+    return CATALOGUE[found.objective].name
 
 
 def _blame(found: Sensitivity) -> Cell:
@@ -230,9 +223,9 @@ def _blame(found: Sensitivity) -> Cell:
 def _bars(found: Sequence[Sensitivity]) -> str:
     """Return the total sensitivities as a table of bars."""
     names = list(found[0].total)
-    rows = [[each.objective, *(Cell(_bar(each.total[name])) for name in names)] for each in found]
+    rows = [[_named(each), *(Cell(_bar(each.total[name])) for name in names)] for each in found]
     caption = "Part of each objective's scatter that would go if a dimension were exact (Sobol)."
-    return html.table(caption, ["objective", *names], rows)
+    return f'<div class="bars">{html.table(caption, ["objective", *names], rows)}</div>'
 
 
 def _bar(part: float) -> str:
@@ -248,19 +241,20 @@ def _proof(proof: Proof) -> str:
     figures = []
     rows: list[list[Any]] = []
     for key, measured in proof.measured.items():
+        name = CATALOGUE[key].name
         unit = CATALOGUE[key].unit
         both = np.concatenate([proof.predicted[key], measured])
         rank = proof.rank[key]
         worst = proof.worst.get(key, float("nan"))
         rank_text = f"{rank:.4f}" if np.isfinite(rank) else "none"
-        rows.append([key, rank_text, f"{100.0 * worst:.2g} %"])
-        x = Axis.of(f"{key}, predicted", unit, both)
-        y = Axis.of(f"{key}, simulated", unit, both)
+        rows.append([name, rank_text, f"{100.0 * worst:.2g} %"])
+        x = Axis.of(f"{name}, predicted", unit, both)
+        y = Axis.of(f"{name}, simulated", unit, both)
         points = [
             (k, float(a), float(b), "best", f"design {k + 1}")
             for k, (a, b) in enumerate(zip(proof.predicted[key], measured, strict=True))
         ]
-        alt = f"{key} of {len(points)} designs, simulated over predicted"
+        alt = f"{name} of {len(points)} designs, simulated over predicted"
         figures.append(f"<figure>{charts.scatter(x, y, points, alt, line=True)}</figure>")
 
     broken = [run.error for run in proof.runs if run.error]

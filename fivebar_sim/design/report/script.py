@@ -4,7 +4,8 @@ from __future__ import annotations
 
 STYLE = """
 text { font: 12px system-ui, sans-serif; fill: var(--ink); text-anchor: middle; }
-text.tick { fill: var(--muted); }
+text.tick { fill: var(--muted); pointer-events: none; paint-order: stroke; stroke: var(--paper);
+  stroke-width: 3px; }
 text.left { text-anchor: end; }
 .axis { stroke: var(--ink); fill: none; }
 .grid { stroke: var(--grid); fill: none; }
@@ -32,6 +33,7 @@ th small, td small { display: block; color: var(--muted); }
 tr[data-k] { cursor: pointer; }
 tr.on { background: color-mix(in srgb, var(--foot) 14%, transparent); }
 .bar { display: inline-block; height: .7em; background: var(--run-1); vertical-align: baseline; }
+.bars .number { text-align: left; }
 .cell { display: inline-block; min-width: 5.5rem; text-align: left; }
 """
 
