@@ -32,11 +32,24 @@ from fivebar_sim.scenario.scenes import Ground, Treadmill
 if TYPE_CHECKING:
     from pyarrow.parquet import ParquetFile
 
-MOST = {"theta_dot": SPEED_LIMIT, "torque": load.LARGEST}
-"""Largest number in columns whose names begin so [rad/s, N m]; `simulate` and `load` ensure it."""
+FARTHEST = 1e30
+"""Largest place in a record [m]: recordings draw in single precision, which ends at 3.4e38."""
+
+PLACES = ("target", "foot", "hip_z", "belt_x", "trunk")
+"""How the names of columns begin that are places."""
+
+MOST = {
+    "theta_dot": SPEED_LIMIT,
+    "torque": load.LARGEST,
+    **dict.fromkeys(PLACES, FARTHEST),
+}
+"""Largest number in columns whose names begin so [rad/s, N m, m].
+
+`simulate` and `load` ensure the first two, and no leg comes near the last.
+"""
 
 LARGEST = 1e100
-"""Largest number in any other column: neither its square nor a drawing of it can overflow."""
+"""Largest number in any other column: neither its square nor a plot of it can overflow."""
 
 SOURCES = ("scenario.toml", "metrics.json", "rollout.parquet")
 """The files that a run is read from; the recording can be rebuilt and may be missing."""
