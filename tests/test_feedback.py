@@ -18,8 +18,10 @@ from fivebar_sim.control.interface import Drive
 from fivebar_sim.control.servo import Servo
 from fivebar_sim.errors import ArgumentError, ConfigError, DivergedError, LoopOpenError
 from fivebar_sim.geometry import FiveBar
+from fivebar_sim.metrics.columns import digest
 from fivebar_sim.rollout import Plan
 from fivebar_sim.scenario import Scenario
+from fivebar_sim.simulation import feedback
 
 H = 1e-3
 ASIDE = ["duration=0.4", "path.frequency=4", "path.ramp=0.1", "limits={}"]
@@ -108,6 +110,29 @@ def test_batch_of_unlike_legs_has_the_bits_of_each_alone() -> None:
         assert result.metrics == alone.metrics
         for name, column in result.record.items():
             np.testing.assert_array_equal(column, alone.record[name], f"{settings} {name}")
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [
+        ["sensors={noise=1e-3, delay=0.0025}", "servo.delay=0.001"],
+        ["controller.kp=1000", "controller.kd=0.5"],  # breaks down within a period
+    ],
+)
+@pytest.mark.parametrize("every", [2, 3])
+def test_periods_step_by_step_have_the_bits_of_periods_at_once(
+    monkeypatch: pytest.MonkeyPatch, settings: list[str], every: int
+) -> None:
+    own = ["controller.name=pd", f"controller.period={every * H}", *settings]
+    plans = [planned(*BRIEF, *own, f"sim.seed={seed}") for seed in (1, 2)]
+    came: list[Any] = []
+    for most in (0, every):
+        monkeypatch.setattr(feedback, "SINGLY", most)
+        try:
+            came.append([digest(result.record) for result in rollout.run_all(plans)])
+        except DivergedError as error:
+            came.append((str(error), error.time))
+    assert came[0] == came[1]
 
 
 def test_seed_is_that_of_each_leg() -> None:

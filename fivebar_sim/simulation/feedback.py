@@ -24,6 +24,9 @@ from fivebar_sim.simulation.taken import Periods, Singles, Taken
 BLOCK = 256
 """Steps after which a block ends, with the control period in which it does."""
 
+SINGLY = 8
+"""Steps of a control period up to which it costs less to take them one by one than at once."""
+
 GLANCE = 0.2
 """Time between two moments at which whoever watches a run in the loop is shown its steps [s]."""
 
@@ -127,8 +130,9 @@ class _Loop:
 
     def _room(self) -> Taken:
         """Return room for a block of steps."""
-        if self._every == 1 and self._legs.whole:
-            return Singles(self._legs, BLOCK)
+        if self._every <= SINGLY and self._legs.whole:
+            # The last period may end beyond the block.
+            return Singles(self._legs, BLOCK + self._every, self._every)
         return Periods(self._legs)
 
     def _block(self, taken: Taken, latest: Latest | None) -> FiveBarError | None:

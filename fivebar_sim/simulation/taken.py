@@ -33,30 +33,35 @@ class Singles:
     Args:
         legs: The legs; see `Legs.whole`.
         length: Most steps.
+        every: Steps in a control period.
     """
 
-    def __init__(self, legs: Legs, length: int) -> None:
+    def __init__(self, legs: Legs, length: int, every: int = 1) -> None:
         self._legs = legs
+        self._every = every
         self._count = 0
         live = legs.live()
-        now = legs.states([each[:, None] for each in live], live[0][:, None, -2:], legs.warned())
-        self._angles = now.qpos[..., MOTORS_FROM_END]
-        self._rates = now.qvel[..., MOTORS_FROM_END]
         # Whole arrays, however little of them is needed: a call costs more than its bytes.
         self._pairs: list[Any] = [
             (np.empty((length, *now.shape), now.dtype), now) for now in (*live, legs.warned())
         ]
+        kept = [each.swapaxes(0, 1) for each, _ in self._pairs]
+        seen = legs.states(kept[:-1], kept[0][..., -2:], legs.warned())
+        self._angles = seen.qpos[..., MOTORS_FROM_END]
+        self._rates = seen.qvel[..., MOTORS_FROM_END]
 
     def take(self, ctrl: Array) -> None:
-        """Take one step with finite commands, (nsim, 1, nu)."""
-        self._legs.once(ctrl[:, 0])
-        for kept, now in self._pairs:
-            kept[self._count] = now
-        self._count += 1
+        """Take the steps of a control period with finite commands, (nsim, n, nu)."""
+        for k in range(ctrl.shape[1]):
+            self._legs.once(ctrl[:, k])
+            for kept, now in self._pairs:
+                kept[self._count] = now
+            self._count += 1
 
     def latest(self) -> tuple[Array, Array]:
-        """Return the motors' angles and rates, (nsim, 1, 2), which change with the next step."""
-        return self._angles, self._rates
+        """Return the motors' angles and rates after the steps of the last `take`, (nsim, n, 2)."""
+        begin = (self._count - 1) // self._every * self._every
+        return self._angles[:, begin : self._count], self._rates[:, begin : self._count]
 
     def states(self) -> States:
         """Return the states after all steps, until MuJoCo first warned."""
