@@ -2,7 +2,7 @@
 
 from fivebar_sim.integrator import Integrator
 from fivebar_sim.model.leg import HIP_HEIGHT, build, leg_spec, quiet, standing, without_log
-from fivebar_sim.model.robot import build_robot
+from fivebar_sim.model.robot import build_robot, robot_spec
 
 __all__ = [
     "HIP_HEIGHT",
@@ -11,6 +11,7 @@ __all__ = [
     "build_robot",
     "leg_spec",
     "quiet",
+    "robot_spec",
     "standing",
     "without_log",
 ]

@@ -52,6 +52,25 @@ def build_robot(
             is none of a robot's.
         GeometryError: The legs do not reach below the trunk, or MuJoCo cannot compile them.
     """
+    spec = robot_spec(robot, scene, timestep=timestep, integrator=integrator, drive=drive)
+    try:
+        with quiet():
+            return spec.compile()
+    except ValueError as error:
+        # MuJoCo's messages span lines; ours are one line.
+        message = " ".join(str(error).split())
+        raise GeometryError(f"MuJoCo refuses robot {robot.name!r}: {message}") from None
+
+
+def robot_spec(
+    robot: Robot,
+    scene: Scene | None = None,
+    *,
+    timestep: float | None = None,
+    integrator: Integrator = "discrete",
+    drive: Drive = "position",
+) -> mujoco.MjSpec:
+    """Return what `build_robot` compiles; its arguments and errors are the same."""
     scene = Floor() if scene is None else scene
     # A leg's scenes have the same base, and no file for robots.
     if not isinstance(scene, Air | Floor):
@@ -76,12 +95,7 @@ def build_robot(
 
         _place(spec, robot, scene, q)
         _rest(spec, robot, scene, q, drive)
-        try:
-            return spec.compile()
-        except ValueError as error:
-            # MuJoCo's messages span lines; ours are one line.
-            message = " ".join(str(error).split())
-            raise GeometryError(f"MuJoCo refuses robot {robot.name!r}: {message}") from None
+    return spec
 
 
 def standing_height(robot: Robot, q: Array) -> float:
