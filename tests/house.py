@@ -25,6 +25,7 @@ LEVELS = (
     "robots setpoints",
     "model",
     "render simulation",
+    "formats",
     "recording tasks",
     "walking",
     "runs environment gym",

@@ -197,7 +197,7 @@ def test_command_writes_a_table(shell: Shell, tmp_path: Path) -> None:
 
 
 def test_command_refuses_in_one_line(shell: Shell) -> None:
-    assert shell.refused("export", "q8bot-trot") == "say what to export: --c DIR or --table FILE"
+    assert shell.refused("export", "q8bot-trot").startswith("say what to export: --mjcf FILE")
     one = ("export", "classic-ellipse", "--table", "a.h")
     assert shell.refused(*one, "--c", "x").endswith("export one at a time")
     assert shell.refused(*one, "--ends", "0", "9") == (

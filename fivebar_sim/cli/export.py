@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated
 
@@ -11,9 +12,12 @@ from fivebar_sim.errors import ConfigError
 
 
 def export(
-    what: Positional[Annotated[str, arg(metavar="LEG|SCENARIO")]],
+    what: Positional[Annotated[str, arg(metavar="LEG|SCENARIO|ROBOT")]],
     /,
     *,
+    mjcf: Annotated[Path | None, arg(metavar="FILE")] = None,
+    urdf: Annotated[Path | None, arg(metavar="FILE")] = None,
+    robot: bool = False,
     c: Annotated[str | None, arg(metavar="DIR")] = None,
     table: Annotated[Path | None, arg(metavar="FILE")] = None,
     unit: Annotated[str, arg(metavar="UNIT")] = "rad",
@@ -21,12 +25,19 @@ def export(
     servos: Annotated[str, arg(metavar="TABLE")] = "hanging",
     ends: Annotated[tuple[int, int] | None, arg(metavar="FIRST LAST")] = None,
 ) -> int:
-    """Write a leg as a C library, or a scenario's gait as a table.
+    """Write a leg as MJCF, URDF or a C library, or a gait as a table.
 
-    docs/firmware.md has what the library can do, docs/servos.md the tables.
+    docs/how-to/bring-a-model.md has more about models, docs/firmware.md about the library,
+    docs/servos.md about the tables.
 
     Args:
-        what: With --c a leg, a preset's name or a TOML file; with --table a scenario.
+        what: A shipped name or a TOML file: with --mjcf or --urdf a leg, a scenario or a robot,
+            with --c a leg, with --table a scenario.
+        mjcf: File for the model that `fivebar run` simulates, .xml, for MuJoCo's viewer and MuJoCo
+            Warp.
+        urdf: File for the leg or the robot as a tree, .urdf; its closed loops are written beside
+            it, in a YAML.
+        robot: With --mjcf and --urdf, a name that legs and robots share is the robot's.
         c: Folder for fivebar_leg.h, fivebar_leg.c, an example sketch and what Arduino and
             PlatformIO ask for. An earlier export there is replaced.
         table: File for the motor angles along the scenario's path, .h (a const array) or .csv; one
@@ -37,10 +48,13 @@ def export(
         servos: For counts and microseconds: hanging, published or xl330.
         ends: First and last command of the servos' range (hobby servos: 0 180 counts, 500 2500 us).
     """
-    if c is None and table is None:
-        raise ConfigError("say what to export: --c DIR or --table FILE")
-    if c is not None and table is not None:
-        raise ConfigError("--c takes a leg and --table a scenario: export one at a time")
+    _check_one({"--mjcf": mjcf, "--urdf": urdf, "--c": c, "--table": table})
+    if mjcf is not None:
+        return _mjcf(what, mjcf, robot)
+    if urdf is not None:
+        return _urdf(what, urdf, robot)
+    if robot:
+        raise ConfigError("--robot goes with --mjcf or --urdf")
     if table is not None:
         return _table(what, table, unit, rate, servos, ends)
 
@@ -51,6 +65,46 @@ def export(
     chosen = FiveBar.load(what)
     place = firmware_export.write(chosen, c)
     print(f"{chosen.name}: written as C to {place}")  # noqa: T201
+    return 0
+
+
+def _check_one(wanted: Mapping[str, object]) -> None:
+    """Raise unless exactly one of the options that name a place is given."""
+    given = [name for name, place in wanted.items() if place is not None]
+    if not given:
+        raise ConfigError("say what to export: --mjcf FILE, --urdf FILE, --c DIR or --table FILE")
+    if len(given) > 1:
+        raise ConfigError(f"{' and '.join(given)}: export one at a time")
+
+
+def _check_suffix(place: Path, suffix: str) -> None:
+    if place.suffix != suffix:
+        raise ConfigError(f"cannot write {place}: the file must end in {suffix}")
+
+
+def _mjcf(source: str, place: Path, robot: bool) -> int:
+    """Write what is simulated as MJCF."""
+    from fivebar_sim.formats import mjcf, subject
+
+    _check_suffix(place, ".xml")
+    chosen = subject.load(source, robot=robot)
+    cleared = mjcf.write(chosen, place)
+    print(f"{chosen.words}: written as MJCF to {place}")  # noqa: T201
+    if cleared:
+        print(f"cleared for MuJoCo Warp: {', '.join(cleared)}")  # noqa: T201
+    return 0
+
+
+def _urdf(source: str, place: Path, robot: bool) -> int:
+    """Write a leg or a robot as URDF, with its loops beside."""
+    from fivebar_sim.formats import subject, urdf
+
+    _check_suffix(place, ".urdf")
+    chosen = subject.load(source, robot=robot)
+    beside = urdf.write(chosen, place)
+    print(  # noqa: T201
+        f"{chosen.words}: written as URDF to {place}, what closes its loops to {beside}"
+    )
     return 0
 
 

@@ -33,7 +33,7 @@ COMMANDS = {
     "view": "Open MuJoCo's viewer: a scenario's run, or a leg moved by sliders.",
     "workspace": "Draw what a leg's foot can reach, and how deep inside it is.",
     "certify": "Check any program that computes a leg against known answers.",
-    "export": "Write a leg as a C library, or a scenario's gait as a table.",
+    "export": "Write a leg as MJCF, URDF or a C library, or a gait as a table.",
     "page": "Write a leg to play with on one HTML page, in any browser.",
 }
 """The commands, each with the first line of its help.
