@@ -47,6 +47,7 @@ PURE = (
     "control.hobby",
     "paths",
     "scenario.forces",
+    "logs",
     "metrics.load",
     "metrics.ground",
     "metrics.energy",
