@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 LINES = 200
 """Lines by which the dialect is told."""
 
-BLOCK = 1 << 22
+BLOCK = 1 << 20
 """Bytes that are read at once."""
 
 ROWS = 20_000
