@@ -12,6 +12,7 @@ from fivebar_sim.files.installed import installed, load
 from fivebar_sim.paths.base import FootPath, Sample
 from fivebar_sim.paths.csv import Csv
 from fivebar_sim.paths.gait import Gait
+from fivebar_sim.paths.heights import Heights
 from fivebar_sim.paths.hop import Hop
 from fivebar_sim.paths.lines import Lines
 from fivebar_sim.paths.shapes import Circle, Ellipse, FigureEight, Line
@@ -26,6 +27,7 @@ __all__ = [
     "FigureEight",
     "FootPath",
     "Gait",
+    "Heights",
     "Hop",
     "Line",
     "Lines",
@@ -39,7 +41,7 @@ __all__ = [
 GROUP = "fivebar_sim.paths"
 """The entry points by which other packages bring kinds of paths."""
 
-PathSpec = Circle | Csv | Ellipse | FigureEight | Gait | Hop | Line | Lines | Sine | Step
+PathSpec = Circle | Csv | Ellipse | FigureEight | Gait | Heights | Hop | Line | Lines | Sine | Step
 KINDS: dict[str, type[FootPath]] = {
     str(kind.__struct_config__.tag): kind for kind in get_args(PathSpec)
 }
