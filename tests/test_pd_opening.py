@@ -17,10 +17,10 @@ from fivebar_sim.geometry import FiveBar
 LEG = FiveBar.load("doggo")
 
 
-def command(law: Pd, error: Any, rate: Any) -> Array:
-    """Return the torques of a law for errors of A and E [rad] and rates [rad/s]."""
+def command(law: Pd, error: Any, rate: Any, time: float = 0.0) -> Array:
+    """Return the torques of a law for errors of A and E [rad] and rates [rad/s] at a time [s]."""
     zero = np.zeros_like(error)
-    seen = Observation(0.0, zero - error, np.asarray(rate))
+    seen = Observation(time, zero - error, np.asarray(rate))
     return law.command(LEG, Servo(), seen, Reference(*[zero] * 7, payload=0.0))
 
 
@@ -48,3 +48,24 @@ def test_equal_gains_are_those_of_each_motor(rng: np.random.Generator) -> None:
 def test_negative_gain_is_refused() -> None:
     with pytest.raises(ArgumentError, match=r"kp_opening must be in \[0, inf\) N m/rad, got -1"):
         Pd(kp_opening=-1.0)
+
+
+def test_each_part_of_a_run_has_its_gains(rng: np.random.Generator) -> None:
+    """At any time a list of gains is the law with the numbers of that part."""
+    seconds = (0.5, 0.8)
+    law = Pd(kp=(2.0, 9.0, 3.0), kd=0.1, kp_opening=(1.0, 7.0, 2.0), seconds=seconds)
+    error = rng.uniform(-1.0, 1.0, (4, 2))
+    rate = rng.uniform(-9.0, 9.0, (4, 2))
+    for time, kp, kp_opening in ((0.0, 2.0, 1.0), (0.5, 9.0, 7.0), (1.299, 9.0, 7.0), (5, 3.0, 2)):
+        alone = Pd(kp=kp, kd=0.1, kp_opening=kp_opening)
+        found = command(law, error, rate, time)
+        np.testing.assert_array_equal(found, command(alone, error, rate))
+
+
+def test_gains_that_do_not_fit_the_parts_are_refused() -> None:
+    with pytest.raises(ArgumentError, match=r"kd must be a number or a list of 2, .* got 3"):
+        Pd(kd=(0.1, 0.2, 0.3), seconds=(0.5,))
+    with pytest.raises(ArgumentError, match=r"kp must be in \[0, inf\) N m/rad, got -1"):
+        Pd(kp=(0.1, -1.0), seconds=(0.5,))
+    with pytest.raises(ArgumentError, match=r"seconds must be in \(0, inf\) s, got 0"):
+        Pd(seconds=(0.0,))

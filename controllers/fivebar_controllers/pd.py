@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import ClassVar, Literal
+from typing import ClassVar, Literal, overload
 
 import msgspec
 import numpy as np
@@ -12,7 +12,12 @@ from fivebar_sim.checks import check_number
 from fivebar_sim.control import Observation, Reference
 from fivebar_sim.control.interface import Drive
 from fivebar_sim.control.servo import Servo
+from fivebar_sim.errors import ArgumentError
 from fivebar_sim.geometry import FiveBar
+from fivebar_sim.paths.heights import part_of
+
+Gain = float | tuple[float, ...]
+"""One number, or one for each part of a run."""
 
 
 class Pd(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -31,6 +36,9 @@ class Pd(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     The default gains suit the preset `classic` (m = 2e-5 kg m^2) at 1 ms. A published study of the
     leg of preset `airhockey` has kp = 5, 50 and 150, kd = 5 and the first law.
 
+    Each gain is one number, or a list with one for each part of the run: a jump is stiff while it
+    pushes off and soft when it lands.
+
     Attributes:
         kp: Position gain of each motor [N m/rad].
         kd: Derivative gain [N m s/rad].
@@ -38,27 +46,40 @@ class Pd(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
             [N m/rad]; kp is then that of its direction, their mean. None: kp for both, so that each
             motor has its own angle alone.
         kd_opening: Derivative gain of the same [N m s/rad]; None: kd.
+        seconds: How long each part of the run but the last takes [s]; empty: it has one part.
         derivative: Whether kd acts on the measured rate or on the rate's error.
         period: Time between two commands T [s].
     """
 
     drive: ClassVar[Drive] = "torque"
 
-    kp: float = 1.0
-    kd: float = 0.01
-    kp_opening: float | None = None
-    kd_opening: float | None = None
+    kp: Gain = 1.0
+    kd: Gain = 0.01
+    kp_opening: Gain | None = None
+    kd_opening: Gain | None = None
+    seconds: tuple[float, ...] = ()
     derivative: Literal["measurement", "error"] = "measurement"
     period: float = 0.001
 
     def __post_init__(self) -> None:
-        check_number("kp", self.kp, "N m/rad", low=0.0)
-        check_number("kd", self.kd, "N m s/rad", low=0.0)
-        for key in ("kp_opening", "kd_opening"):
-            value = getattr(self, key)
-            if value is not None:
-                check_number(key, value, "N m/rad" if key == "kp_opening" else "N m s/rad", low=0.0)
+        for seconds in self.seconds:
+            check_number("seconds", seconds, "s", low=0.0, strict=True)
+        for key in ("kp", "kd", "kp_opening", "kd_opening"):
+            self._check_gain(key, getattr(self, key))
         check_number("period", self.period, "s", low=0.0, strict=True)
+
+    def _check_gain(self, key: str, gain: Gain | None) -> None:
+        """Raise unless a gain is a number, or one for each part of the run."""
+        parts = len(self.seconds) + 1
+        if isinstance(gain, tuple) and len(gain) != parts:
+            raise ArgumentError(
+                f"{key} must be a number or a list of {parts}, one for each part of the run that "
+                f"seconds makes, got {len(gain)}"
+            )
+        unit = "N m/rad" if key.startswith("kp") else "N m s/rad"
+        for value in gain if isinstance(gain, tuple) else (gain,):
+            if value is not None:
+                check_number(key, value, unit, low=0.0)
 
     def command(self, leg: FiveBar, servo: Servo, seen: Observation, wanted: Reference) -> Array:
         """Return the motor torques [N m], (..., 2)."""
@@ -67,7 +88,19 @@ class Pd(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
         if self.derivative == "error":
             rate = wanted.theta_dot - seen.theta_dot
         error = wanted.theta - seen.theta
-        return _weighed(self.kp, self.kp_opening, error) + _weighed(self.kd, self.kd_opening, rate)
+
+        part = int(part_of(self.seconds, seen.time)) if self.seconds else 0
+        spring = _weighed(_in_part(self.kp, part), _in_part(self.kp_opening, part), error)
+        return spring + _weighed(_in_part(self.kd, part), _in_part(self.kd_opening, part), rate)
+
+
+@overload
+def _in_part(gain: Gain, part: int) -> float: ...
+@overload
+def _in_part(gain: Gain | None, part: int) -> float | None: ...
+def _in_part(gain: Gain | None, part: int) -> float | None:
+    """Return a gain in one part of the run."""
+    return gain[part] if isinstance(gain, tuple) else gain
 
 
 def _weighed(mean: float, opening: float | None, pair: Array) -> Array:
