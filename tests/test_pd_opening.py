@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from fivebar_controllers.pd import Pd
 
+from fivebar_sim import Scenario
 from fivebar_sim.arrays import Array
 from fivebar_sim.control import Observation, Reference
 from fivebar_sim.control.servo import Servo
@@ -48,6 +49,23 @@ def test_equal_gains_are_those_of_each_motor(rng: np.random.Generator) -> None:
 def test_negative_gain_is_refused() -> None:
     with pytest.raises(ArgumentError, match=r"kp_opening must be in \[0, inf\) N m/rad, got -1"):
         Pd(kp_opening=-1.0)
+
+
+def test_shipped_doggo_gets_the_currents_of_its_firmware(rng: np.random.Generator) -> None:
+    """controller.cpp in Nate711/ODrive, in its own words; 0.084 N m/A makes its amperes torques."""
+    scenario = Scenario.load("robot-doggo-trot")
+    error = rng.uniform(-1.0, 1.0, 2)
+    rate = rng.uniform(-9.0, 9.0, 2)
+    alpha, beta = error
+    d_alpha, d_beta = rate
+    tau_theta = 80.0 * (alpha / 2.0 + beta / 2.0) - 0.5 * (d_alpha / 2.0 + d_beta / 2.0)
+    tau_gamma = 50.0 * (alpha / 2.0 - beta / 2.0) - 0.5 * (d_alpha / 2.0 - d_beta / 2.0)
+    amperes = [tau_theta * 0.5 + tau_gamma * 0.5, tau_theta * 0.5 - tau_gamma * 0.5]
+
+    law = scenario.controller
+    assert isinstance(law, Pd)
+    np.testing.assert_allclose(command(law, error, rate), 0.084 * np.array(amperes), atol=1e-12)
+    assert scenario.servo.limit == pytest.approx(0.084 * 50.0)
 
 
 def test_each_part_of_a_run_has_its_gains(rng: np.random.Generator) -> None:
