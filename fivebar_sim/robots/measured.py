@@ -30,6 +30,10 @@ class RobotTable(Table, frozen=True):
             what they took back is lost. None where it got nowhere.
         cost_of_transport_electric: The same with the copper heat; None as above, and where the
             servo's table does not describe the winding.
+        jump_height: Rise of the trunk from where it set off to its apogee [m], of a path that does
+            not repeat, and so is the next; unset in a gait. None where all feet never left the
+            floor. See `jump.Jump`.
+        agility: The same by the time that it took [m/s].
     """
 
     speed: Number
@@ -41,6 +45,8 @@ class RobotTable(Table, frozen=True):
     falls: Count
     cost_of_transport: Amount
     cost_of_transport_electric: Amount
+    jump_height: Amount | msgspec.UnsetType = msgspec.UNSET
+    agility: Amount | msgspec.UnsetType = msgspec.UNSET
 
 
 class LegTable(Table, frozen=True):

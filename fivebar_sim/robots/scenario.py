@@ -13,7 +13,7 @@ from fivebar_sim.control.sensors import Sensors
 from fivebar_sim.errors import ArgumentError, ConfigError, unknown
 from fivebar_sim.files import presets, tables
 from fivebar_sim.files.tables import Table
-from fivebar_sim.metrics.catalogue import GROUND_KEYS, ROBOT_KEYS, ROBOTS
+from fivebar_sim.metrics.catalogue import GROUND_KEYS, JUMP_KEYS, ROBOT_KEYS, ROBOTS
 from fivebar_sim.metrics.guards import Guards
 from fivebar_sim.robots.floor import KINDS, Air, Floor
 from fivebar_sim.robots.floor import Scene as Stage
@@ -197,4 +197,9 @@ def _check_together(scenario: RobotScenario, where: str) -> None:
     for key in scenario.limits:
         if held and key in (*TRUNK_KEYS, *GROUND_KEYS):
             raise ConfigError(f"{where}: limits.{key} needs a floor: scene must be 'floor'")
+        if key in JUMP_KEYS and scenario.path.period is not None:
+            raise ConfigError(
+                f"{where}: limits.{key} needs a path that does not repeat, as kind 'heights': a "
+                "gait is no jump"
+            )
     reading.check_servo_limits(scenario.limits, scenario.servo, where)

@@ -9,10 +9,11 @@ import msgspec
 import numpy as np
 
 from fivebar_sim.robots import Floor
+from fivebar_sim.robots.jump import Jump
 from fivebar_sim.robots.measure import Gone, measure
 from fivebar_sim.robots.scenario import RobotScenario
 from fivebar_sim.walking.plan import plan_scenario
-from fivebar_sim.walking.walk import walk_all
+from fivebar_sim.walking.walk import Walk, jumped, walk_all
 
 TOGETHER = 16
 """Robots that are simulated at one time: 2000 steps of each are some 20 MB."""
@@ -40,12 +41,14 @@ class Outcome(NamedTuple):
         mass: Mass of the robot [kg].
         delay: Delay of its servos [s].
         moved: How it moved; its falls among it.
+        jump: Its highest jump; None where it never left the floor.
     """
 
     friction: float
     mass: float
     delay: float
     moved: Gone
+    jump: Jump | None
 
 
 def draw(
@@ -87,13 +90,17 @@ def outcomes(scenarios: Sequence[RobotScenario], nthread: int = 1) -> list[Outco
 
     for start in range(0, len(scenarios), TOGETHER):
         plans = [plan_scenario(each) for each in scenarios[start : start + TOGETHER]]
-        for went in walk_all(plans, nthread):
-            assert went.trunk is not None
-            planned = went.plan
-            moved = measure(went.trunk, planned.window, planned.robot.length, len(went.falls))
-            scene = planned.scene
-            # Of the draw, as it was run.
-            friction = scene.friction if isinstance(scene, Floor) else 0.0
-            servo = planned.scenario.servo
-            found.append(Outcome(friction, planned.robot.mass, servo.delay, moved))
+        found.extend(outcome(went) for went in walk_all(plans, nthread))
     return found
+
+
+def outcome(went: Walk) -> Outcome:
+    """Return what came of a run on a floor."""
+    assert went.trunk is not None
+    planned = went.plan
+    moved = measure(went.trunk, planned.window, planned.robot.length, len(went.falls))
+    scene = planned.scene
+    # Of the draw, as it was run.
+    friction = scene.friction if isinstance(scene, Floor) else 0.0
+    delay = planned.scenario.servo.delay
+    return Outcome(friction, planned.robot.mass, delay, moved, jumped(went))

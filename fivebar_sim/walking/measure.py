@@ -24,7 +24,7 @@ from fivebar_sim.simulation import record as recorded
 from fivebar_sim.simulation.measure import Unrecorded, heating_of, load_of
 from fivebar_sim.walking import energy as whole_energy
 from fivebar_sim.walking.guards import Seen, judge
-from fivebar_sim.walking.walk import Walk, saturated
+from fivebar_sim.walking.walk import Walk, jumped, saturated
 
 NOWHERE = 0.01
 """Body lengths below which a way is none: a cost of transport over it would mean nothing."""
@@ -212,11 +212,18 @@ def _robot(went: Walk, legs: list[Leg]) -> RobotTable | msgspec.UnsetType:
             watts = sum(float(leg.heated.watts.sum()) for leg in legs if leg.heated is not None)
             electric = (given + watts * seconds) / (weight * way)
 
-    return RobotTable(
+    table = RobotTable(
         **msgspec.structs.asdict(moved),
         cost_of_transport=cost,
         cost_of_transport_electric=electric,
     )
+    # The flights of a gait are no jumps.
+    if planned.scenario.path.period is not None:
+        return table
+    leap = jumped(went)
+    height = None if leap is None else leap.height
+    agility = None if leap is None else leap.agility
+    return msgspec.structs.replace(table, jump_height=height, agility=agility)
 
 
 def _legs(legs: list[Leg], window: slice) -> dict[str, LegTable]:

@@ -12,6 +12,7 @@ from fivebar_sim.errors import DivergedError
 from fivebar_sim.metrics.columns import Record
 from fivebar_sim.robots import LEGS, Floor
 from fivebar_sim.robots.columns import FORCE_COLUMNS, TRUNK_COLUMNS, trunk
+from fivebar_sim.robots.jump import Jump, jump
 from fivebar_sim.robots.measure import Fall, Trunk, falls
 from fivebar_sim.simulation import record as recorded
 from fivebar_sim.simulation.record import Part
@@ -118,6 +119,14 @@ def _leg(planned: RobotPlan, states: States, k: int) -> Record:
     if isinstance(planned.scene, Floor):
         record |= dict(zip(FORCE_COLUMNS, states.ground[0, :, 3 * k : 3 * k + 3].T, strict=True))
     return {name: np.ascontiguousarray(column) for name, column in record.items()}
+
+
+def jumped(went: Walk) -> Jump | None:
+    """Return the highest jump of a run; None where the robot never left the floor upward."""
+    if went.trunk is None:
+        return None
+    stands = np.any([went.record[f"{leg}_ground_z"] > 0.0 for leg in LEGS], axis=0)
+    return jump(went.trunk, stands)
 
 
 def saturated(went: Walk, k: int) -> Bools:
