@@ -56,7 +56,9 @@ def test_fall_is_counted() -> None:
 
 
 @pytest.mark.long
-@pytest.mark.parametrize(("name", "up"), [("q8bot-trot", 64), ("q8bot-trot-fast", 64)])
+@pytest.mark.parametrize(
+    ("name", "up"), [("q8bot-trot", 64), ("q8bot-trot-fast", 64), ("doggo-trot", 64)]
+)
 def test_robot_stays_up_in_64_of_64(name: str, up: int) -> None:
     """As docs/robots.md says."""
     found = outcomes(draw(loaded(f"robot-{name}"), 64, SEED), nthread=0)
