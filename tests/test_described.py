@@ -11,6 +11,7 @@ import pytest
 from fivebar_sim.metrics.columns import (
     BELT_COLUMN,
     COLUMNS,
+    FRICTION_COLUMNS,
     GROUND_COLUMNS,
     HIP_COLUMNS,
     RAIL_COLUMN,
@@ -20,7 +21,7 @@ from fivebar_sim.robots.robot import LEGS
 from fivebar_sim.runs import directory
 from fivebar_sim.runs.described import Described, described
 
-OF_LEGS = (*COLUMNS, *HIP_COLUMNS, *GROUND_COLUMNS, RAIL_COLUMN, BELT_COLUMN)
+OF_LEGS = (*COLUMNS, *FRICTION_COLUMNS, *HIP_COLUMNS, *GROUND_COLUMNS, RAIL_COLUMN, BELT_COLUMN)
 
 
 def test_every_column_is_described() -> None:

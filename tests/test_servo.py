@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
+import msgspec
 import mujoco
 import numpy as np
 import pytest
@@ -31,6 +32,14 @@ PRESETS = sorted(resources.shipped("models/servos"))
 
 each_drive = pytest.mark.parametrize("drive", ["position", "torque"])
 each_integrator = pytest.mark.parametrize("integrator", ["discrete", "implicitfast"])
+
+
+def motor(name: str) -> Servo:
+    """Return a preset with Coulomb's friction alone; tests/test_friction_load.py has the others."""
+    servo = Servo.load(name)
+    return msgspec.structs.replace(servo, friction=servo.dry)
+
+
 each_motor = pytest.mark.parametrize("name", [name for name in PRESETS if name != "ideal"])
 
 PLAIN = Servo(limit=0.05)
@@ -132,14 +141,14 @@ def lone_motors(servo: Servo, integrator: Integrator, drive: Drive, inertia: flo
 @each_integrator
 @each_motor
 def test_free_motor_reaches_its_speed(name: str, integrator: Integrator, drive: Drive) -> None:
-    servo = Servo.load(name)
+    servo = motor(name)
     assert servo.limit is not None
     data = mujoco.MjData(mj := lone_motors(servo, integrator, drive, 1e-4))
     push = servo.limit if drive == "torque" else 1e4 * servo.limit / servo.kp
     data.ctrl[:] = push, -push
     for _ in range(2000):
         mujoco.mj_step(mj, data)
-    expected = (servo.limit - servo.friction) / servo.back_emf  # speed, less what friction takes
+    expected = (servo.limit - servo.dry) / servo.back_emf  # speed, less what friction takes
     np.testing.assert_allclose(data.qvel, [expected, -expected], rtol=1e-2)
 
 
@@ -148,14 +157,14 @@ def test_free_motor_reaches_its_speed(name: str, integrator: Integrator, drive: 
 @each_motor
 def test_stalled_motor_gives_its_limit(name: str, integrator: Integrator, drive: Drive) -> None:
     """Held by an inertia of 1000 kg m^2, the torque is what sets it in motion."""
-    servo = Servo.load(name)
+    servo = motor(name)
     assert servo.limit is not None
     data = mujoco.MjData(mj := lone_motors(servo, integrator, drive, inertia := 1e3))
     push = 2.0 * servo.limit if drive == "torque" else 2.0 * servo.limit / servo.kp
     before = data.qpos.copy()
     data.ctrl[:] = np.array([push, -push]) + (before if drive == "position" else 0.0)
     mujoco.mj_step(mj, data)
-    gives = inertia * data.qvel / H + servo.friction * np.sign(data.qvel)
+    gives = inertia * data.qvel / H + servo.dry * np.sign(data.qvel)
     # the damping acts on the rate after the step, h limit / 1000 kg m^2
     np.testing.assert_allclose(gives, [servo.limit, -servo.limit], rtol=1e-6)
     state = data.ctrl, before, data.qpos, data.qvel
@@ -275,7 +284,7 @@ def test_presets_are_their_data_sheets() -> None:
     for value, figure in figures:
         assert value == pytest.approx(figure, rel=1e-7)
     assert Servo.load("ideal") == Servo()
-    assert PRESETS == ["hobby-9g", "ideal", "t-motor", "xl330"]
+    assert PRESETS == ["hobby-9g", "ideal", "t-motor", "xl330", "xl330-m077", "xl330-m288"]
 
 
 @pytest.mark.parametrize(

@@ -77,7 +77,7 @@ class Servo(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
 
         if self.feedforward == "torque":
             tau = dynamics.step_torques(
-                leg, q, h, motion.force[:-1], payload=payload, friction=servo.friction
+                leg, q, h, motion.force[:-1], payload=payload, friction=servo.dry
             )
             u = u + tau / servo.kp
         return u

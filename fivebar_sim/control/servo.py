@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from fivebar_sim.arrays import Array, Bools
 from fivebar_sim.checks import check_number, check_step
 from fivebar_sim.control import delay, winding
+from fivebar_sim.control.friction import Friction, as_friction
 from fivebar_sim.dynamics.heat import Winding
 from fivebar_sim.errors import ArgumentError
 from fivebar_sim.files import presets, tables
@@ -45,7 +46,8 @@ class Servo(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
         kd: Derivative gain [N m s/rad].
         limit: Largest torque [N m], at stall; None for no limit.
         speed: No-load speed [rad/s], where the motor has no torque left; None for no such line.
-        friction: Coulomb friction of the gear [N m]; not part of the motor's torque.
+        friction: Coulomb friction of the gear [N m], or a table, see `Friction`; not part of the
+            motor's torque.
         rate: Commands per second on the bus [Hz]; None for one every timestep.
         delay: Time from sending a command to its effect [s].
         resolution: Step of the angles that can be commanded [rad], counted from 0; 0 for exact.
@@ -65,7 +67,7 @@ class Servo(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
     kd: float = 0.05
     limit: float | None = None
     speed: float | None = None
-    friction: float = 0.0
+    friction: float | Friction = 0.0
     rate: float | None = None
     delay: float = 0.0
     resolution: float = 0.0
@@ -90,7 +92,8 @@ class Servo(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
             # Both may be legal and their quotient still overflow.
             check_number("limit / speed", self.back_emf, "N m s/rad")
 
-        check_number("friction", self.friction, "N m", low=0.0)
+        if not isinstance(self.friction, Friction):
+            check_number("friction", self.friction, "N m", low=0.0)
         if self.rate is not None:
             check_number("rate", self.rate, "Hz", low=0.0, strict=True)
 
@@ -108,7 +111,7 @@ class Servo(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
         Raises:
             ConfigError: Unknown preset, unreadable file, unknown key, or a number out of range.
         """
-        return tables.convert(read_table(source), cls, "servo", str(source))
+        return servo_of(read_table(source), str(source))
 
     @property
     def back_emf(self) -> float:
@@ -121,12 +124,30 @@ class Servo(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
         return winding.winding(self)
 
     @property
+    def gear(self) -> Friction:
+        """The gear's friction, whichever way the table says it."""
+        return as_friction(self.friction)
+
+    @property
+    def records_friction(self) -> bool:
+        """Whether a run's record says what the gears take: of any friction but a number."""
+        return isinstance(self.friction, Friction)
+
+    @property
+    def dry(self) -> float:
+        """Coulomb friction of the gear that turns without load [N m]."""
+        return self.gear.base
+
+    @property
     def damping(self) -> float:
         """Rate gain of the position servo, which a velocity feedforward cancels [N m s/rad]."""
-        return self.kd + self.back_emf
+        return self.kd + self.back_emf + self.gear.viscous
 
     def passive(self, drive: Drive) -> float:
-        """Return the rate gain that the limit does not clip, the joint's damping [N m s/rad]."""
+        """Return the motor's rate gain that the limit does not clip [N m s/rad].
+
+        With the gear's viscous friction it is the joint's damping.
+        """
         return self.kd if _is_kd_passive(self, drive) else self.back_emf
 
     def check_rate(self, timestep: float) -> None:
@@ -210,11 +231,13 @@ class ServoArrays:
     Attributes:
         kp: Position gains [N m/rad], (n, 1, 1).
         kd: Derivative gains [N m s/rad], (n, 1, 1).
+        viscous: Viscous friction of the gears [N m s/rad], (n, 1, 1).
         limit, speed, resolution: The same for all servos.
     """
 
     kp: Array
     kd: Array
+    viscous: Array
     limit: float | None
     speed: float | None
     resolution: float
@@ -230,7 +253,8 @@ class ServoArrays:
         first = servos[0]
         kp = np.array([[[servo.kp]] for servo in servos])
         kd = np.array([[[servo.kd]] for servo in servos])
-        return cls(kp, kd, first.limit, first.speed, first.resolution)
+        viscous = np.array([[[servo.gear.viscous]] for servo in servos])
+        return cls(kp, kd, viscous, first.limit, first.speed, first.resolution)
 
     @property
     def back_emf(self) -> float:
@@ -240,7 +264,7 @@ class ServoArrays:
     @property
     def damping(self) -> Array:
         """As in `Servo` [N m s/rad], (n, 1, 1)."""
-        return self.kd + self.back_emf
+        return self.kd + self.back_emf + self.viscous
 
 
 def check_alike(servos: Sequence[Servo]) -> None:
@@ -253,6 +277,25 @@ def check_alike(servos: Sequence[Servo]) -> None:
     for name in ("limit", "speed", "resolution"):
         if any(getattr(servo, name) != getattr(first, name) for servo in servos):
             raise ArgumentError(f"servos of one group must have the same {name}")
+
+
+def servo_of(table: tables.Table, where: str) -> Servo:
+    """Return the servo of a table, whose friction may be a table too.
+
+    Args:
+        table: The keys of a servo.
+        where: The file, for messages.
+
+    Raises:
+        ConfigError: Unknown key, or a number out of range.
+    """
+    gear = table.get("friction")
+    if not isinstance(gear, dict):
+        return tables.convert(table, Servo, "servo", where)
+    # By itself, so that its errors name its own keys.
+    found = tables.convert(gear, Friction, "servo.friction", where)
+    rest = {key: value for key, value in table.items() if key != "friction"}
+    return msgspec.structs.replace(tables.convert(rest, Servo, "servo", where), friction=found)
 
 
 def read_table(source: str | Path) -> tables.Table:

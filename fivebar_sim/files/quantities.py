@@ -34,6 +34,7 @@ SIZES: dict[str, dict[str, float]] = {
     "N m/rad": {"mN m/rad": 1e-3, "N m/rad": 1.0, "N m/deg": 360.0 / TURN},
     "N m s/rad": {"mN m s/rad": 1e-3, "N m s/rad": 1.0},
     "N m/A": {"mN m/A": 1e-3, "N m/A": 1.0},
+    "1/(N m)": {"1/(N m)": 1.0},
     "ohm": {"mohm": 1e-3, "ohm": 1.0},
     "K/W": {"K/W": 1.0},
     "deg C": {"deg C": 1.0},

@@ -51,6 +51,9 @@ COLUMNS = (
 )
 """What every record has, in its order."""
 
+FRICTION_COLUMNS = tuple(f"friction_{motor}" for motor in MOTORS)
+"""What the gears take, of a servo whose friction is a table."""
+
 HIP_COLUMNS = ("hip_z", "hip_dot_z")
 """Of a hip that moves."""
 

@@ -1,6 +1,7 @@
 """Legs and robots as MuJoCo models."""
 
 from fivebar_sim.integrator import Integrator
+from fivebar_sim.model.friction import friction_law
 from fivebar_sim.model.leg import HIP_HEIGHT, build, leg_spec, quiet, standing, without_log
 from fivebar_sim.model.robot import build_robot, robot_spec
 
@@ -9,6 +10,7 @@ __all__ = [
     "Integrator",
     "build",
     "build_robot",
+    "friction_law",
     "leg_spec",
     "quiet",
     "robot_spec",

@@ -24,6 +24,7 @@ from fivebar_sim.integrator import CONNECT, Integrator, solref
 from fivebar_sim.kinematics.stops import stops_at_B, stops_at_C
 from fivebar_sim.links import Link, combined
 from fivebar_sim.metrics.columns import JOINTS, MOTORS
+from fivebar_sim.model.friction import rub
 from fivebar_sim.scenario.scenes import Ground, Payload, Scene, Treadmill, named
 
 HIP_HEIGHT = 1.3
@@ -304,23 +305,19 @@ def _drive(spec: mujoco.MjSpec, servo: Servo | None, drive: Drive) -> None:
     for name in MOTORS:
         joint = spec.joint(name)
         actuator = spec.actuator(name)
-        joint.damping[0] = 0.0 if servo is None else servo.passive(drive)
+        joint.damping[0] = 0.0 if servo is None else servo.passive(drive) + servo.gear.viscous
         if drive == "torque":
             actuator.set_to_motor()
         elif servo is not None:
             actuator.set_to_position(kp=servo.kp, kv=0.0 if servo.limit is None else servo.kd)
         if servo is None:
             continue
-        if servo.friction > 0.0:
-            # A hard constraint: with MuJoCo's default values a light joint does not stick.
-            joint.frictionloss = servo.friction
-            # Two timesteps is the shortest time constant that MuJoCo's solver keeps stable.
-            joint.solref_friction = (2.0 * spec.option.timestep, 1.0)
-            joint.solimp_friction[:3] = (0.9999, 0.9999, 0.001)
         if servo.limit is not None:
             actuator.forcerange = (-servo.limit, servo.limit)
             actuator.forcelimited = mujoco.mjtLimited.mjLIMITED_TRUE
 
+    if servo is not None:
+        rub(spec, servo)
     if drive == "torque":
         spec.key("home").ctrl = np.zeros(len(spec.actuators))
 

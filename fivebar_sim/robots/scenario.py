@@ -193,6 +193,11 @@ def _check_together(scenario: RobotScenario, where: str) -> None:
         raise ConfigError(f"{where}: gait.{error}") from None
 
     check_window(scenario, where)
+    if scenario.servo.records_friction:
+        raise ConfigError(
+            f"{where}: servo.friction of a robot must be a number [N m]: friction that changes "
+            "with speed and load is known of single legs only"
+        )
     held = isinstance(scenario.scene, Air)
     for key in scenario.limits:
         if held and key in (*TRUNK_KEYS, *GROUND_KEYS):

@@ -30,6 +30,7 @@ KINDS = (
     (r"theta_dot_([ABED])", "rad/s", "rate of the joint {0}"),
     (r"ctrl_([AE])", "rad or N m", "command to motor {0}: a setpoint, or a torque"),
     (r"torque_([AE])", "N m", "torque that motor {0} gave in the step"),
+    (r"friction_([AE])", "N m", "torque of motor {0}'s gear friction on its joint"),
     (r"gap", "m", "distance between the two ends that the loop joins at C"),
     (r"hip_z", "m", "height of the hip above the floor"),
     (r"hip_dot_z", "m/s", "rate of the hip's height"),

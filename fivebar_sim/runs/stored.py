@@ -15,6 +15,7 @@ from fivebar_sim.metrics import load
 from fivebar_sim.metrics.columns import (
     BELT_COLUMN,
     COLUMNS,
+    FRICTION_COLUMNS,
     GROUND_COLUMNS,
     HIP_COLUMNS,
     RAIL_COLUMN,
@@ -155,6 +156,8 @@ def _common_columns(scenario: Scenario) -> list[str]:
 def _own_columns(scenario: Scenario) -> list[str]:
     """Return the columns that a leg's scene adds."""
     columns = []
+    if scenario.servo.records_friction:
+        columns += FRICTION_COLUMNS
     if isinstance(scenario.scene, Ground):
         columns += [*HIP_COLUMNS, *GROUND_COLUMNS, RAIL_COLUMN]
     if isinstance(scenario.scene, Treadmill):

@@ -12,7 +12,7 @@ from typing import Any
 from fivebar_sim import control, geometry, paths
 from fivebar_sim.checks import check_number
 from fivebar_sim.control import Feedback, Setpoints
-from fivebar_sim.control.servo import Servo
+from fivebar_sim.control.servo import Servo, servo_of
 from fivebar_sim.control.servo import read_table as read_servo
 from fivebar_sim.errors import ArgumentError, ConfigError, UnknownError, unknown
 from fivebar_sim.files import quantities, tables
@@ -125,12 +125,12 @@ def leg(value: Any, where: str, folder: Path, armature: float | None = None) -> 
 
 def servo(value: Any, where: str, folder: Path) -> Servo:
     """Return the servo of a preset, of a file beside the scenario, or of a table with changes."""
-
-    def check(table: Table, source: str) -> Servo:
-        return tables.convert(table, Servo, "servo", source)
-
-    base, own = _preset("servo", read_servo, check, value, where, folder)
-    return tables.convert({**base, **own}, Servo, "servo", where)
+    base, own = _preset("servo", read_servo, servo_of, value, where, folder)
+    gear = base.get("friction")
+    changed = own.get("friction")
+    if isinstance(gear, dict) and isinstance(changed, dict) and "model" not in changed:
+        own["friction"] = {**gear, **changed}
+    return servo_of({**base, **own}, where)
 
 
 def check_servo_limits(limits: Iterable[str], servo: Servo, where: str) -> None:

@@ -29,7 +29,7 @@ def check(scenario: Scenario, wanted: Motion) -> None:
 
     torque = _holding(scenario, wanted)
     # A joint at rest sticks: its friction carries that much of the torque.
-    worst = np.abs(torque).max(axis=1) - scenario.servo.friction
+    worst = np.abs(torque).max(axis=1) - scenario.servo.dry
     k = int(np.argmax(worst))
     if worst[k] > limit:
         name = MOTORS[int(np.argmax(np.abs(torque[k])))]

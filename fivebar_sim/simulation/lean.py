@@ -18,6 +18,7 @@ import mujoco
 import numpy as np
 
 from fivebar_sim.arrays import Bools
+from fivebar_sim.model import friction_law
 
 RECORDED = "ground"
 """The sensor that is recorded; those of a robot end with it, after the leg's name."""
@@ -80,7 +81,8 @@ def left_out(model: mujoco.MjModel, *, forces: bool = True) -> int:
         chosen.append(off.mjDSBL_SENSOR)
     if not can_touch(model):
         chosen.append(off.mjDSBL_CONTACT)
-    if not (model.dof_frictionloss.any() or model.tendon_frictionloss.any()):
+    rubs = model.dof_frictionloss.any() or friction_law(model) is not None
+    if not (rubs or model.tendon_frictionloss.any()):
         chosen.append(off.mjDSBL_FRICTIONLOSS)
 
     stiff = (model.jnt_stiffness, model.jnt_stiffnesspoly, model.tendon_stiffness)

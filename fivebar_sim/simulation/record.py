@@ -11,15 +11,18 @@ from fivebar_sim import dynamics, kinematics
 from fivebar_sim.arrays import Array, Bools, blocks
 from fivebar_sim.control.servo import Drive, MotorStep, applied_torque
 from fivebar_sim.control.servo import saturated as clipped
+from fivebar_sim.dynamics import gears
 from fivebar_sim.kinematics.stops import Ranges
 from fivebar_sim.metrics import lasting
 from fivebar_sim.metrics.columns import (
     BELT_COLUMN,
     COLUMNS,
+    FRICTION_COLUMNS,
     GROUND_COLUMNS,
     HIP_COLUMNS,
     JOINTS,
     MOTOR_JOINTS,
+    MOTORS_FROM_END,
     RAIL_COLUMN,
     Record,
     motors,
@@ -68,7 +71,35 @@ def columns(planned: Plan, part: Part) -> Record:
     vectors = [*target.T, *points.F.T, *q.T, *v.T, *ctrl.T, *torque.T]
     values = [wanted.time[rows], *vectors, np.hypot(gap[:, 0], gap[:, 1])]
     record = dict(zip(COLUMNS, values, strict=True))
-    return record | _surroundings(planned, part)
+    return record | _rubbed(planned, part) | _surroundings(planned, part)
+
+
+def forces(planned: Plan, part: Part) -> Array:
+    """Return the joint forces of constraints and viscous friction in each step [N m], (N, nv).
+
+    MuJoCo counts the latter as damping, which a motor has too.
+    """
+    states = part.states
+    found = states.constraint[0].copy()
+    found[:, MOTORS_FROM_END] -= (
+        planned.scenario.servo.gear.viscous * states.qvel[0, :, MOTORS_FROM_END]
+    )
+    return found
+
+
+def _rubbed(planned: Plan, part: Part) -> Record:
+    """Return the columns of the gears' friction, where the servo's table describes it."""
+    if not planned.scenario.servo.records_friction:
+        return {}
+    states = part.states
+    before = np.concatenate([part.before[None], states.qpos[0, :-1]])
+    hip = before[:, 0] if before.shape[1] > len(JOINTS) else np.zeros(len(before))
+    bars = gears.bars(planned.scenario.leg)
+    found = gears.through(
+        bars, before[:, -4:], states.constraint[0, :, -4:], states.ground[0], hip
+    ).gear
+    viscous = planned.scenario.servo.gear.viscous * states.qvel[0, :, MOTORS_FROM_END]
+    return dict(zip(FRICTION_COLUMNS, (found - viscous).T, strict=True))
 
 
 def _joints(states: States) -> tuple[Array, Array, Array]:

@@ -64,8 +64,8 @@ class Recorder:
             for name, values in record.columns(planned, part).items():
                 self._column(name)[rows] = values
             self._saturated[rows] = record.saturated(planned, part)
+            self._constraint[rows] = record.forces(planned, part)
 
-        self._constraint[rows] = states.constraint[0]
         self._unsolved[rows] = states.iterations[0] >= planned.model.opt.iterations
         self._before = states.qpos[0, -1].copy()
         self._done = rows.stop

@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from fivebar_sim.arrays import Array, Bools
 from fivebar_sim.errors import ArgumentError, DivergedError
 from fivebar_sim.kinematics.stops import SPEED_LIMIT
-from fivebar_sim.model import without_log
+from fivebar_sim.model import friction_law, without_log
+from fivebar_sim.model.gears import Gears, rubbed, spread
 from fivebar_sim.simulation.clipping import Clipping
 from fivebar_sim.simulation.lean import lean, recorded_columns, without_clock
 from fivebar_sim.simulation.limited import STATE, rollout
@@ -94,16 +95,23 @@ class Legs:
         forces: bool = True,
     ) -> None:
         shared = isinstance(models, mujoco.MjModel)
-        stepped = lean([models] if shared else models, forces=forces)
+        kept = [models] if shared else list(models)
+        # Friction that changes with load has to know the ground's force.
+        loaded = any(friction_law(each) is not None for each in kept)
+        stepped = lean(kept, forces=forces or loaded)
         first = stepped[0]
         if qpos.ndim != 2 or qpos.shape[1] != first.nq:
             raise ArgumentError(f"qpos must have shape (nsim, {first.nq}), got {qpos.shape}")
+        everyone = stepped * len(qpos) if shared else stepped
+        self._gears = Gears.of(everyone, recorded_columns(first))
         self._batch = Batch(first, len(qpos), nthread)
-        if not shared:
+        if self._gears is not None:
+            spread(self._batch, everyone)
+        elif not shared:
             self._batch.set_models(stepped)
         self._batch.qpos = qpos
         self._ctrl = self._batch.bind("ctrl")
-        self._clipping = Clipping.of(stepped * len(qpos) if shared else stepped)
+        self._clipping = Clipping.of(everyone)
         self._sizes = first.nq, first.nv, first.nu
         self._ground = recorded_columns(first)
 
@@ -142,9 +150,15 @@ class Legs:
             raise ArgumentError("ctrl must be finite: MuJoCo would reset the leg and go on")
 
         with without_log(), without_clock():
-            if self._clipping is None:
-                return self._batch.rollout(ctrl.shape[1], ctrl, record=record)
-            return rollout(self._batch, self._clipping, ctrl, record)
+            if self._gears is None:
+                return self._rollout(ctrl, record)
+            return rubbed(self._batch, self._gears, ctrl, record, self._rollout)
+
+    def _rollout(self, ctrl: Array, record: Sequence[Any]) -> dict[Any, Array]:
+        """Return what is recorded of the next steps, with torque limits kept."""
+        if self._clipping is None:
+            return self._batch.rollout(ctrl.shape[1], ctrl, record=record)
+        return rollout(self._batch, self._clipping, ctrl, record)
 
     def states(self, arrays: Sequence[Any], ctrl: Array, warnings: NDArray[Any]) -> States:
         """Return states from what `live` lists, of some steps each, (nsim, n, ...).
@@ -176,8 +190,8 @@ class Legs:
 
     @property
     def whole(self) -> bool:
-        """Whether no torque limit may make a step be taken again, so that `once` is right."""
-        return self._clipping is None
+        """Whether `once` is right: no limit is kept by a second try, and no friction changes."""
+        return self._clipping is None and self._gears is None
 
     def live(self) -> list[NDArray[Any]]:
         """Return what MuJoCo has now: state, constraint, iterations, any sensors, (nsim, ...).

@@ -16,7 +16,9 @@ from dm_env import specs
 from fivebar_sim.arrays import Array
 from fivebar_sim.metrics.columns import MOTORS
 from fivebar_sim.model import without_log
+from fivebar_sim.model.gears import Gears, rubbed
 from fivebar_sim.simulation.clipping import Clipping
+from fivebar_sim.simulation.lean import recorded_columns
 from fivebar_sim.simulation.limited import STATE, rollout
 from fivebar_sim.tasks import REASONS
 from fivebar_sim.tasks.episodes import Episodes, Outcome
@@ -60,6 +62,10 @@ class _One:
         self.warning[0, :, 1] = data.warning.number
         return {item: np.array(each)[None] for item, each in rows.items()}
 
+    def expand(self, name: str) -> Array:
+        """Return a field of the model, (1, ...), to be written."""
+        return getattr(self.model, name)[None]
+
     def _read(self, item: Any) -> Array:
         if isinstance(item, str):
             return np.array(getattr(self._data, item))
@@ -81,6 +87,11 @@ class LegPhysics(Physics):
     ctrl: Array
     qpos: Array
     qvel: Array
+    _gears: Gears | None = None
+
+    def begin(self) -> None:
+        """Begin an episode: nothing has passed through the gears yet."""
+        self._gears = Gears.of([self.model.ptr], recorded_columns(self.model.ptr))
 
     def step(self, nstep: int = 1) -> None:
         """Take nstep steps, each with its row of ctrl; the last row is repeated."""
@@ -88,11 +99,18 @@ class LegPhysics(Physics):
         one = _One(self.model.ptr, self.data.ptr)
         ctrl = self.ctrl[np.minimum(np.arange(nstep), len(self.ctrl) - 1)][None]
         clipping = Clipping.of([one.model])
-        with without_log():
+
+        def taken(sent: Array, record: Sequence[Any]) -> dict[Any, Any]:
             if clipping is None:
-                states = one.rollout(nstep, ctrl, int(mujoco.mjtState.mjSTATE_CTRL), (STATE,))
+                commands = int(mujoco.mjtState.mjSTATE_CTRL)
+                return one.rollout(sent.shape[1], sent, commands, record)
+            return rollout(one, clipping, sent, record)
+
+        with without_log():
+            if self._gears is None:
+                states = taken(ctrl, (STATE,))
             else:
-                states = rollout(one, clipping, ctrl, (STATE,))
+                states = rubbed(one, self._gears, ctrl, (STATE,), taken)
         self.qpos, self.qvel = np.split(states[STATE][0, :, 1:], [one.model.nq], axis=1)
 
     @property
@@ -149,6 +167,7 @@ class LegTask(control.Task):
     def initialize_episode(self, physics: LegPhysics) -> None:
         """Put the leg at rest near the start of its path."""
         one = np.zeros(1, dtype=np.int64)
+        physics.begin()
         physics.data.qpos[:] = self.episodes.begin(one, [_generator(self._random)])[0]
         self.outcome = self.episodes.outcome()
 

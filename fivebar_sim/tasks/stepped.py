@@ -46,6 +46,8 @@ class SteppedLegs(Legs):
         # No mj_forward: it would be of the model's default pose, which the next line replaces.
         self._batch.reset(rows, stage=mujoco.mjtStage.mjSTAGE_NONE.value)
         self._batch.qpos[rows] = qpos
+        if self._gears is not None:
+            self._gears.restart(rows)
 
     def moved(self, ctrl: Array) -> tuple[Array, Array, NDArray[Any]]:
         """Return what `Legs.moved` does."""
@@ -63,6 +65,7 @@ class SteppedLegs(Legs):
             "nthread": self._nthread,
             "state": self._batch.state.copy(),
             "warning": self._batch.warning.copy(),
+            "gears": None if self._gears is None else self._gears.memory.copy(),
         }
 
     def __setstate__(self, kept: dict[str, Any]) -> None:
@@ -70,6 +73,8 @@ class SteppedLegs(Legs):
         SteppedLegs.__init__(self, models, np.zeros((len(models), models[0].nq)), kept["nthread"])
         self._batch.state[:] = kept["state"]
         self._batch.warning[:] = kept["warning"]
+        if self._gears is not None:
+            self._gears.memory = kept["gears"]
 
     def _renew(self) -> None:
         """In a process that was forked off, make a batch whose threads are alive."""

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fivebar_sim.arrays import Array
+from fivebar_sim.control.friction import Friction
 from fivebar_sim.control.servo import Servo
 from fivebar_sim.design.evaluation.legs import Rows
 
@@ -62,7 +63,7 @@ class Motors(NamedTuple):
         return cls(
             limit=column("limit", math.nan) * g,
             speed=column("speed", math.inf) / g,
-            friction=column("friction", 0.0) * g,
+            friction=column("dry", 0.0) * g,
             kt=column("kt", math.nan) * g,
             resistance=column("resistance", math.nan),
             armature=np.where(np.isnan(own), armature, own * g**2),
@@ -88,6 +89,10 @@ def through(servo: Servo, gear: float) -> Servo:
         "armature": gear**2,
         "kt": gear,
     }
+
+    if isinstance(servo.friction, Friction):
+        del factors["friction"]
+        servo = msgspec.structs.replace(servo, friction=servo.friction.geared(gear))
 
     given = {key: getattr(servo, key) for key in factors}
     changed = {key: factors[key] * value for key, value in given.items() if value is not None}
