@@ -93,7 +93,7 @@ def draw(ax: Axes, leg: FiveBar) -> None:
     ax.plot(*np.stack([p.C_left, beyond], axis=-1), color=LEFT, lw=0.9, ls=":", zorder=1)
     for name, point, dx, dz in (
         ("A", A, -2, 6), ("E", E, 2, 6), ("B", p.B, -6, 0), ("D", p.D, 6, 0),
-        ("C", p.C_left, 6, -1), ("F", p.F, 0, -7),
+        ("C", p.C_left, -6, -3), ("F", p.F, 6, -1),
     ):  # fmt: skip
         joint(ax, point, name, dx, dz)
 
@@ -104,21 +104,21 @@ def draw(ax: Axes, leg: FiveBar) -> None:
 
     # Beside the line to F, which crosses the arc.
     angle(ax, A, 0.0, float(q[0]), 9.0, r"$\theta_A$", (0.7, 0.6))
-    angle(ax, A, alpha, float(q[0]), 19.0, r"$\beta$")
-    angle(ax, A, 0.0, alpha, 14.0, r"$\alpha$")
+    angle(ax, A, alpha, float(q[0]), 19.0, r"$\beta$", (0.4, 0.78))
+    angle(ax, A, 0.0, alpha, 14.0, r"$\alpha$", (0.55, 1.25))
     angle(ax, E, 0.0, float(q[2]), 9.0, r"$\theta_E$")
     bend_from = float(q[0] + q[1])
-    angle(ax, p.C_left, bend_from, bend_from + leg.bend, 20.0, "bend")
+    angle(ax, p.C_left, bend_from, bend_from + leg.bend, 20.0, "bend", (0.2, 1.35))
     frame(ax)
 
 
 def frame(ax: Axes) -> None:
     """Draw the hip frame at O."""
     # The arrow along x ends before E, and has its name below.
-    for dx, dz, name, at in ((11, 0, "x", (9, -3.5)), (0, 14, "z", (0, 16))):
+    for dx, dz, name, at in ((11, 0, "x", (8.5, -4)), (0, 14, "z", (0, 16))):
         ax.annotate("", (dx, dz), (0, 0), arrowprops={"arrowstyle": "-|>", "color": DARK, "lw": 1})
         ax.text(*at, name, fontsize=11, ha="center", va="center")
-    ax.text(0, -5, "O", fontsize=11, ha="center", va="center")
+    ax.text(4.5, 5, "O", fontsize=11, ha="center", va="center")
 
 
 if __name__ == "__main__":
@@ -128,5 +128,5 @@ if __name__ == "__main__":
     axes.set_aspect("equal")
     axes.axis("off")
     axes.set(xlim=(-65, 45), ylim=(-105, 25))
-    figure.savefig(OUT, bbox_inches="tight", metadata={"Date": None})
+    figure.savefig(OUT, bbox_inches="tight", facecolor="white", metadata={"Date": None})
     print(f"wrote {OUT.name}")
