@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import re
 import runpy
 import sys
@@ -10,6 +11,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+
+from fivebar_sim import FiveBar, geometry
 
 SCRIPTS = Path(__file__).parents[1] / "scripts"
 PRINTED = """run: classic leg
@@ -224,3 +227,15 @@ def test_pages_are_reached_from_the_navigation() -> None:
 
     walk(tomllib.loads((root / "zensical.toml").read_text(encoding="utf-8"))["project"]["nav"])
     assert named == {str(p.relative_to(root / "docs")) for p in (root / "docs").rglob("*.md")}
+
+
+def test_keys_of_a_leg_are_those_of_its_page() -> None:
+    text = (SCRIPTS.parent / "docs" / "reference" / "geometry.md").read_text(encoding="utf-8")
+    rows = [
+        [cell.strip() for cell in row.split("|")[1:4]] for row in re.findall(r"^\| `.*", text, re.M)
+    ]
+    fields = dataclasses.fields(FiveBar)
+    assert rows == [
+        [f"`{field.name}`", geometry.UNITS.get(field.name, ""), str(field.default)]
+        for field in fields
+    ]
