@@ -240,6 +240,21 @@ def test_damaged_block_is_evaluated_again(tmp_path: Path, monkeypatch: pytest.Mo
     assert search(task, tmp_path / "out").fresh == 128
 
 
+def test_front_that_was_changed_is_no_front(tmp_path: Path) -> None:
+    task = load(tmp_path, TWO + 'method = "grid"\npoints = 3')
+    search(task, tmp_path / "out")
+    front = tmp_path / "out" / "front.parquet"
+    sound = pq.read_table(front)
+    numbers = sound.set_column(0, sound.schema.names[0], [0.5 + sound.column(0).to_numpy()])
+    for damaged in (numbers, sound.slice(0, 0), sound.drop_columns(["row"])):
+        pq.write_table(damaged, front)
+        with pytest.raises(RunDirectoryError, match=r"front\.parquet is damaged, or was changed"):
+            search(task, tmp_path / "out")
+    front.unlink()
+    with pytest.raises(RunDirectoryError, match=r"front\.parquet is damaged, or was changed"):
+        search(task, tmp_path / "out")
+
+
 def test_search_killed_at_its_very_start_goes_on(tmp_path: Path) -> None:
     task = load(tmp_path, TWO + 'method = "grid"\npoints = 3')
     (tmp_path / "half").mkdir()
@@ -256,8 +271,9 @@ def test_no_feasible_design_says_what_excludes_how_many(tmp_path: Path) -> None:
     task = load(
         tmp_path, TWO.replace("reach = 0.002", "reach = 0.2") + 'method = "grid"\npoints = 4'
     )
-    with pytest.raises(ConfigError, match="no feasible design among 16: reach excludes 16"):
-        search(task, tmp_path / "out")
+    for _ in range(2):
+        with pytest.raises(ConfigError, match="no feasible design among 16: reach excludes 16"):
+            search(task, tmp_path / "out")
     assert pq.read_table(tmp_path / "out" / "designs.parquet").num_rows == 16
 
 

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 from shell import Shell, started
@@ -181,8 +182,34 @@ def test_another_sweep_in_the_directory_is_refused(short: Path) -> None:
     with pytest.raises(ConfigError, match="holds something else: choose another --out"):
         sweep(short, vary, short.parent / "mine", settings=SHORT)
     (out / "sweep.json").write_text("{", encoding="utf-8")
-    with pytest.raises(ConfigError, match=r"its sweep\.json is damaged"):
-        sweep(short, vary, out, settings=SHORT)
+    for text in ("{", "[" * 100_000):
+        (out / "sweep.json").write_text(text, encoding="utf-8")
+        with pytest.raises(ConfigError, match=r"its sweep\.json is damaged"):
+            sweep(short, vary, out, settings=SHORT)
+
+
+def test_damaged_tables_of_a_sweep_are_named(short: Path) -> None:
+    """A whole one, and the block of one that was broken off."""
+    vary = ["leg.L2=0.05,0.06"]
+    out = short.parent / "out"
+    sweep(short, vary, out, settings=SHORT)
+    sound = pq.read_table(out / "runs.parquet")
+    (out / "blocks").mkdir()
+    for file in (out / "runs.parquet", out / "blocks" / "00000000.parquet"):
+        for damage, why in (
+            (b"PAR1", "damaged"),
+            (sound.drop_columns(["verdict"]), "the column verdict must be string, once"),
+            (sound.append_column("x", sound["run"]), "has the column 'x'"),
+            (pa.concat_tables([sound, sound]), r"must have \d rows, got 4"),
+        ):
+            if isinstance(damage, bytes):
+                file.write_bytes(damage)
+            else:
+                pq.write_table(damage, file)
+            with pytest.raises(ConfigError, match=why) as caught:
+                sweep(short, vary, out, settings=SHORT)
+            assert str(file) in str(caught.value)
+        file.unlink()
 
 
 def test_two_programs_do_not_sweep_into_one_place(short: Path) -> None:

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from fivebar_sim.errors import FiveBarError, RunDirectoryError
+from fivebar_sim.files import parquet_file
 from fivebar_sim.kinematics.stops import SPEED_LIMIT
 from fivebar_sim.metrics import load
 from fivebar_sim.metrics.columns import (
@@ -88,7 +87,7 @@ def read(path: Path) -> StoredRun:
         directory.check_run(path)
 
     file = path / checksums.RECORD
-    with _opened(file) as parquet:
+    with parquet_file.opened(file, "a record", RunDirectoryError) as parquet:
         sums = checksums.read(parquet.schema_arrow.metadata)
         # First: of a file of another run, any other message would be about the wrong one.
         checksums.check_files(path, sums)
@@ -163,27 +162,6 @@ def _own_columns(scenario: Scenario) -> list[str]:
     if isinstance(scenario.scene, Treadmill):
         columns.append(BELT_COLUMN)
     return columns
-
-
-@contextmanager
-def _opened(file: Path) -> Iterator[ParquetFile]:
-    """Open a record; whatever is wrong with the file is raised in one line."""
-    import pyarrow
-    import pyarrow.parquet
-
-    try:
-        # Given a name instead of a file, pyarrow would expand ~ and read it as a URI.
-        with file.open("rb") as stream:
-            yield pyarrow.parquet.ParquetFile(stream, page_checksum_verification=True)
-    # It is an OSError too.
-    except RunDirectoryError:
-        raise
-    except (OSError, pyarrow.ArrowException) as error:
-        if isinstance(error, OSError) and error.strerror:
-            raise RunDirectoryError(f"cannot read {file}: {error.strerror}") from None
-        # pyarrow's messages may run over several lines.
-        message = " ".join(str(error).split())
-        raise RunDirectoryError(f"{file} is not a record, or is damaged: {message}") from None
 
 
 def _record(file: Path, parquet: ParquetFile, scenario: Scenario) -> Record:

@@ -11,11 +11,12 @@ from numpy.typing import NDArray
 
 from fivebar_sim.arrays import Array
 from fivebar_sim.errors import ConfigError, UnknownError, unknown
-from fivebar_sim.files import whole_file
+from fivebar_sim.files import parquet_file, whole_file
 from fivebar_sim.metrics.catalogue import SHOWN
 from fivebar_sim.render.palette import RUNS, TIME
 from fivebar_sim.report.look import colour, project_style
 from fivebar_sim.sweep.points import Points
+from fivebar_sim.sweep.store import WHAT
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -108,9 +109,8 @@ def draw(
 
 def _read(runs: Path, points: Points, metric: str, keys: Sequence[str]) -> Shown:
     """Return what a picture shows."""
-    import pyarrow.parquet as pq
-
-    table = pq.read_table(runs, columns=[*keys, metric])
+    with parquet_file.opened(runs, WHAT, ConfigError) as parquet:
+        table = parquet.read(columns=[*keys, metric])
     name, scale, unit = SHOWN[metric]
     values = table.column(metric).to_numpy().astype(np.float64)
     with_same = [axis for axis in points.axes if not set(axis.keys) & set(keys)]

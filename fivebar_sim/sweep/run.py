@@ -86,11 +86,13 @@ def run(swept: Study, out: Path, workers: Workers, watch: Watch | None = None) -
     size = block_size(swept)
     store = Store(out, study.fingerprint(swept), math.ceil(count / size), rows.schema(swept.points))
     if store.whole:
+        store.check_runs(count)
         store.tidy()
         return Swept(store.runs, count, 0)
 
+    blocks = [range(begin, min(begin + size, count)) for begin in range(0, count, size)]
     with store.open():
-        numbers = {k: range(k * size, min((k + 1) * size, count)) for k in store.missing()}
+        numbers = {k: blocks[k] for k in store.missing()}
         new = sum(map(len, numbers.values()))
         done = count - new
         watch = watch or (lambda _done, _count: None)
@@ -99,7 +101,7 @@ def run(swept: Study, out: Path, workers: Workers, watch: Watch | None = None) -
             store.add(k, rows.table(swept.points, numbers[k], found))
             done += len(numbers[k])
             watch(done, count)
-        store.finish()
+        store.finish(map(len, blocks))
     return Swept(store.runs, count, new)
 
 

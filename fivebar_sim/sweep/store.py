@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from fivebar_sim.errors import ConfigError
-from fivebar_sim.files import tables, whole_file
+from fivebar_sim.files import input_file, parquet_file, tables, whole_file
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -30,6 +30,9 @@ BLOCKS = "blocks"
 
 STAGED = ".fivebar-"
 """What the names of files begin with that are being written."""
+
+WHAT = "the table of a sweep"
+"""What `RUNS` is, for messages."""
 
 GROUP = 10_000
 """Rows of the table that are read at once."""
@@ -93,14 +96,42 @@ class Store:
         """Write a block, whole or not at all."""
         self._write(self.place / BLOCKS / self._name(number), [rows])
 
-    def finish(self) -> None:
-        """Write the table of all blocks, and delete them."""
-        import pyarrow.parquet as pq
+    def finish(self, sizes: Iterable[int]) -> None:
+        """Write the table of all blocks, and delete them.
 
-        folder = self.place / BLOCKS
-        blocks = (pq.read_table(folder / self._name(k)) for k in range(self._count))
+        Args:
+            sizes: The rows of each block.
+
+        Raises:
+            ConfigError: A block is damaged.
+        """
+        blocks = (self._block(k, rows) for k, rows in enumerate(sizes))
         self._write(self.runs, _groups(blocks))
         self.tidy()
+
+    def check_runs(self, count: int) -> None:
+        """Raise unless the table of the whole sweep is there as it was written, by its columns.
+
+        Args:
+            count: Its rows.
+
+        Raises:
+            ConfigError: Says what is wrong with it.
+        """
+        with parquet_file.opened(self.runs, WHAT, ConfigError) as parquet:
+            parquet_file.check_table(self.runs, parquet, self._schema, count, ConfigError)
+
+    def _block(self, number: int, count: int) -> pa.Table:
+        """Return the rows of a block."""
+        path = self.place / BLOCKS / self._name(number)
+        try:
+            with parquet_file.opened(path, "a block of a sweep", ConfigError) as parquet:
+                parquet_file.check_table(path, parquet, self._schema, count, ConfigError)
+                return parquet.read()
+        except ConfigError as error:
+            raise ConfigError(
+                f"{error}; delete that file, and the same command simulates its runs again"
+            ) from None
 
     def tidy(self) -> None:
         """Delete what is only of use until all rows are there."""
@@ -115,7 +146,10 @@ class Store:
     def _write(self, path: Path, parts: Iterable[pa.Table]) -> None:
         import pyarrow.parquet as pq
 
-        with whole_file.stage(path) as place, pq.ParquetWriter(place, self._schema) as writer:
+        with (
+            whole_file.stage(path) as place,
+            pq.ParquetWriter(place, self._schema, write_page_checksum=True) as writer,
+        ):
             for part in parts:
                 writer.write_table(part, row_group_size=GROUP)
 
@@ -137,7 +171,7 @@ class Store:
             return
 
         try:
-            there = json.loads((self.place / STUDY).read_text(encoding="utf-8"))
+            there = input_file.read_json(self.place / STUDY)
         except (OSError, ValueError):
             there = None
         if there != self._depends:

@@ -6,6 +6,10 @@ from collections import Counter
 from pathlib import Path
 from typing import NamedTuple
 
+from fivebar_sim.errors import ConfigError
+from fivebar_sim.files import parquet_file
+from fivebar_sim.sweep.store import WHAT
+
 
 class Summary(NamedTuple):
     """How the runs ended.
@@ -29,16 +33,19 @@ class Summary(NamedTuple):
 
 
 def summary(runs: Path) -> Summary:
-    """Return how the runs in a sweep's table ended."""
-    import pyarrow.parquet as pq
+    """Return how the runs in a sweep's table ended.
 
+    Raises:
+        ConfigError: The table is damaged.
+    """
     counts: Counter[str | None] = Counter()
     error: str | None = None
     # Block by block: a large sweep does not fit in memory.
-    for batch in pq.ParquetFile(runs).iter_batches(columns=["verdict", "error"]):
-        counts.update(batch.column("verdict").to_pylist())
-        if error is None:
-            error = next((e for e in batch.column("error").to_pylist() if e is not None), None)
+    with parquet_file.opened(runs, WHAT, ConfigError) as parquet:
+        for batch in parquet.iter_batches(columns=["verdict", "error"]):
+            counts.update(batch.column("verdict").to_pylist())
+            if error is None:
+                error = next((e for e in batch.column("error").to_pylist() if e is not None), None)
     refused = counts.pop(None, 0)
     verdicts = {str(verdict): counts[verdict] for verdict in sorted(counts, key=str)}
     return Summary(verdicts, refused, error)

@@ -68,7 +68,7 @@ def search(task: Task, folder: Path, *, threads: int = 1, watch: Watcher | None 
 
     Raises:
         ConfigError: A method that the task cannot have, or no design keeps to all constraints.
-        RunDirectoryError: Something else is in the directory.
+        RunDirectoryError: Something else is in the directory, or a file of it is damaged.
     """
     asking, total = method(task)
     store = Store(task, folder)
@@ -86,8 +86,10 @@ def search(task: Task, folder: Path, *, threads: int = 1, watch: Watcher | None 
         raise
 
     assert progress.front is not None
-    store.close(progress.blocks, progress.front, finished=True)
-    if not len(progress.front.rows):
+    found = len(progress.front.rows) > 0
+    # Without a front the blocks stay: the next time says as well what excluded the designs.
+    store.close(progress.blocks, progress.front, finished=found)
+    if not found:
         raise ConfigError(f"{task.where}: {excluded_text(progress)}")
     return progress
 

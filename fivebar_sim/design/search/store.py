@@ -1,7 +1,8 @@
 """The directory of a search: blocks of evaluated designs while it goes on, one table at its end.
 
 DIR/task.toml          the task
-DIR/state.json         what the directory belongs to, and whether the search is finished
+DIR/state.json         what the directory belongs to, and whether the search is finished; then the
+                       checksum of the front, too
 DIR/blocks/K.parquet   the K-th block, written whole or not at all; gone at the end
 DIR/designs.parquet    every evaluated design        DIR/front.parquet   the front
 """
@@ -23,7 +24,7 @@ from fivebar_sim.design.evaluation.measures import limits
 from fivebar_sim.design.search.front import Front
 from fivebar_sim.design.task.task import Task
 from fivebar_sim.errors import ConfigError, RunDirectoryError
-from fivebar_sim.files import input_file, whole_file
+from fivebar_sim.files import input_file, parquet_file, whole_file
 
 STATE = "state.json"
 DESIGNS = "designs.parquet"
@@ -50,6 +51,7 @@ class Store:
         self.folder = folder
         self.fingerprint = fingerprint(task)
         self.finished = False
+        self._checksum = ""
         self._open()
 
     def _open(self) -> None:
@@ -63,6 +65,7 @@ class Store:
                     "this one; name another directory with --out"
                 )
             self.finished = bool(known.get("finished"))
+            self._checksum = known.get("front", "")
             return
 
         if self.folder.exists() and (not self.folder.is_dir() or _others(self.folder)):
@@ -73,7 +76,9 @@ class Store:
         whole_file.write(self.folder / TASK, Path(self.task.where).read_bytes())
 
     def _write_state(self) -> None:
-        state = {"fingerprint": self.fingerprint, "finished": self.finished}
+        state: dict[str, Any] = {"fingerprint": self.fingerprint, "finished": self.finished}
+        if self.finished:
+            state["front"] = self._checksum
         whole_file.write(self.folder / STATE, json.dumps(state, indent=2) + "\n")
 
     def path(self, number: int) -> Path:
@@ -82,25 +87,30 @@ class Store:
 
     def read(self, number: int) -> Evaluated | None:
         """Return a block that was kept; None if it was not, or is unreadable."""
-        import pyarrow as pa
-        import pyarrow.parquet as pq
-
         path = self.path(number)
         if not path.is_file():
             return None
         try:
-            return self._evaluated(pq.read_table(path))
+            with parquet_file.opened(path, "a block of designs", RunDirectoryError) as parquet:
+                # As many rows as it has: whether they are those asked for is seen afterwards.
+                rows = parquet.metadata.num_rows
+                parquet_file.check_table(path, parquet, self._schema(), rows, RunDirectoryError)
+                return self._evaluated(parquet.read())
         # A disk that lost a part of it: it is evaluated again.
-        except (pa.ArrowException, OSError, KeyError):
+        except RunDirectoryError:
             return None
 
     def write(self, number: int, block: Evaluated) -> None:
         """Keep a block."""
         import pyarrow.parquet as pq
 
-        self.path(number).parent.mkdir(exist_ok=True)
+        folder = self.path(number).parent
+        try:
+            folder.mkdir(exist_ok=True)
+        except OSError as error:
+            raise RunDirectoryError(f"cannot write {folder}: {error.strerror or error}") from None
         with whole_file.stage(self.path(number)) as place:
-            pq.write_table(self._table(block), place)
+            pq.write_table(self._table(block), place, write_page_checksum=True)
 
     def stored(self, count: int) -> Iterator[Evaluated]:
         """Yield the first blocks."""
@@ -116,8 +126,7 @@ class Store:
         import pyarrow.parquet as pq
 
         with whole_file.stage(self.folder / DESIGNS) as place:
-            schema = self._table(front.designs.take(slice(0, 0))).schema
-            with pq.ParquetWriter(place, schema) as writer:
+            with pq.ParquetWriter(place, self._schema()) as writer:
                 for block in self.stored(blocks):
                     writer.write_table(self._table(block))
 
@@ -126,26 +135,42 @@ class Store:
             pq.write_table(table, place)
         if finished:
             self.finished = True
+            self._checksum = _checksum(self.folder / FRONT)
             self._write_state()
             shutil.rmtree(self.folder / "blocks", ignore_errors=True)
 
     def read_front(self) -> Front:
-        """Return the front of a finished search."""
-        import pyarrow.parquet as pq
+        """Return the front of a finished search.
 
-        table = pq.read_table(self.folder / FRONT)
+        Raises:
+            RunDirectoryError: It is not the one that the search wrote.
+        """
+        file = self.folder / FRONT
+        if _checksum(file) != self._checksum:
+            raise RunDirectoryError(
+                f"{file} is damaged, or was changed after the search: delete {self.folder}, and "
+                "the same command searches again"
+            )
+        with parquet_file.opened(file, "the front of a search", RunDirectoryError) as parquet:
+            table = parquet.read()
         return Front(table.column(ROW).to_numpy(), self._evaluated(table))
+
+    def _schema(self) -> Any:
+        """Return the columns of all tables, as an Arrow schema."""
+        import pyarrow as pa
+
+        told = [each._asdict() for each in columns(self.task)]
+        numbers = [(each["name"], pa.float64()) for each in told]
+        schema = pa.schema([*numbers, (FEASIBLE, pa.bool_())])
+        return schema.with_metadata({"fivebar.columns": json.dumps(told)})
 
     def _table(self, block: Evaluated) -> Any:
         """Return a block as an Arrow table."""
         import pyarrow as pa
 
-        names = [each.name for each in columns(self.task)]
         numbers = np.concatenate([block.values, block.objectives, block.measures], axis=1)
         arrays = [pa.array(np.ascontiguousarray(column)) for column in numbers.T]
-        table = pa.table([*arrays, pa.array(block.feasible)], [*names, FEASIBLE])
-        told = [each._asdict() for each in columns(self.task)]
-        return table.replace_schema_metadata({"fivebar.columns": json.dumps(told)})
+        return pa.table([*arrays, pa.array(block.feasible)], schema=self._schema())
 
     def _evaluated(self, table: Any) -> Evaluated:
         """Return what an Arrow table holds."""
@@ -157,6 +182,15 @@ class Store:
         broken = [each.violation(numbers[:, m + k]) for k, each in enumerate(bounds)]
         violations = np.stack(broken, axis=1)
         return Evaluated(numbers[:, :d], numbers[:, d:m], numbers[:, m:], violations)
+
+
+def _checksum(file: Path) -> str:
+    """Return the SHA-256 of a file in hexadecimal; "" if it cannot be read."""
+    try:
+        input_file.check(file, input_file.TABLE)
+        return hashlib.sha256(file.read_bytes()).hexdigest()
+    except OSError:
+        return ""
 
 
 def _others(folder: Path) -> bool:
