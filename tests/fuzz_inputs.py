@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import json
+import tomllib
 from typing import Any
 
 import tomli_w
@@ -171,6 +172,22 @@ def changed(draw: st.DrawFn, table: Table) -> Table:
 
 def _toml(table: Table) -> bytes:
     return tomli_w.dumps(table).encode("utf-8", "backslashreplace")
+
+
+@st.composite
+def tomls(draw: st.DrawFn, text: str) -> bytes:
+    """Return what may be a TOML file: one that is, with some numbers and values exchanged."""
+    table = draw(changed(tomllib.loads(text)))
+    for _ in range(draw(st.sampled_from((0, 0, 1, 2)))):
+        flat = list(_branches(table))
+        holder, key = flat[draw(st.integers(0, len(flat) - 1))]
+        if draw(st.integers(0, 3)) == 0:
+            del holder[key]
+        else:
+            holder[key] = draw(values)
+        if not table:
+            break
+    return _toml(table)
 
 
 def _put(table: Table, key: str, value: Any) -> None:
