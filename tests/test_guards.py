@@ -160,6 +160,11 @@ def test_each_turns_the_verdict_and_says_when(
     assert ran(name, *(s for s in settings if s.startswith(KEPT))).verdict == "not judged"
 
 
+def test_each_has_words_also_where_it_holds() -> None:
+    for guard in ran("classic-ellipse", "duration=0.8").measured.guards:
+        assert str(guard) == f"guard {guard.name}: ok"
+
+
 def test_time_is_that_of_the_first_step_past_the_bound() -> None:
     result = ran("rail-landing", "scene.drop=1.0", "duration=1.2")
     guard = tripped(result)["ground"]

@@ -118,6 +118,9 @@ class Guard(Table, frozen=True):
 
     def __str__(self) -> str:
         """Return the message of a guard that tripped: the bound, when, and the worst value."""
+        if self.time is None:
+            return f"guard {self.name}: ok"
+
         rule = RULES[self.name]
         worst = rule.worst.format(rule.show(self.value, 3))
         # A leg of a robot, where the sentence has no place for it.
