@@ -27,6 +27,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from fivebar_sim import kinematics
+from fivebar_sim.arrays import Array
 from fivebar_sim.checks import check_number
 from fivebar_sim.errors import ArgumentError
 from fivebar_sim.geometry import HEAVIEST, FiveBar
@@ -56,6 +57,15 @@ def dot(a: Vector, b: Vector) -> Scalar:
 def placed(e: Vector, r: Vector) -> Vector:
     """Return a vector r = (along, across) of a link in the hip frame; e is the link's direction."""
     return r[0] * e[0] - r[1] * e[1], r[0] * e[1] + r[1] * e[0]
+
+
+def split(pairs: Array) -> Vector:
+    """Return the two coordinates of pairs (..., 2), each (...); of a single pair plain numbers."""
+    # Arithmetic on NumPy's own numbers takes three times as long.
+    if pairs.ndim == 1:
+        x, z = pairs.tolist()
+        return x, z
+    return pairs[..., 0], pairs[..., 1]
 
 
 class Pose(NamedTuple):

@@ -13,7 +13,7 @@ from fivebar_sim import kinematics
 from fivebar_sim.arrays import Array, as_pairs, broadcast, finite
 from fivebar_sim.checks import check_number
 from fivebar_sim.dynamics import motion, stepwise
-from fivebar_sim.dynamics.chain import Chain, Vector, cross, placed
+from fivebar_sim.dynamics.chain import Chain, cross, placed, split
 from fivebar_sim.dynamics.motion import Law, Motion
 from fivebar_sim.geometry import FiveBar
 from fivebar_sim.kinematics.rates import check_sine
@@ -72,10 +72,10 @@ class LegDynamics:
         theta, w, alpha, F = _pairs(
             theta=theta, theta_dot=theta_dot, theta_ddot=theta_ddot, foot_force=force
         )
-        p = self._chain.pose(*_split(theta))
+        p = self._chain.pose(*split(theta))
         M_AA, M_AE, M_EE = self._chain.mass(p)
-        h_A, h_E = self._chain.bias(p, *_split(w))
-        f_A, f_E = self._chain.foot_torques(p, _split(F))
+        h_A, h_E = self._chain.bias(p, *split(w))
+        f_A, f_E = self._chain.foot_torques(p, split(F))
         tau_A = M_AA * alpha[..., 0] + M_AE * alpha[..., 1] + h_A - f_A
         tau_E = M_AE * alpha[..., 0] + M_EE * alpha[..., 1] + h_E - f_E
 
@@ -84,19 +84,19 @@ class LegDynamics:
     def statics(self, theta: ArrayLike, foot_force: ArrayLike) -> Array:
         """Return the motor torques that hold a foot force at rest, without weight [N m]."""
         theta, F = _pairs(theta=theta, foot_force=foot_force)
-        f_A, f_E = self._chain.foot_torques(self._chain.pose(*_split(theta)), _split(F))
+        f_A, f_E = self._chain.foot_torques(self._chain.pose(*split(theta)), split(F))
         return np.stack([-f_A, -f_E], axis=-1)
 
     def mass_matrix(self, theta: ArrayLike) -> Array:
         """Return the mass matrix in motor coordinates [kg m^2], (..., 2, 2)."""
         (theta,) = _pairs(theta=theta)
-        M_AA, M_AE, M_EE = self._chain.mass(self._chain.pose(*_split(theta)))
+        M_AA, M_AE, M_EE = self._chain.mass(self._chain.pose(*split(theta)))
         return np.stack([np.stack([M_AA, M_AE], -1), np.stack([M_AE, M_EE], -1)], -2)
 
     def bias(self, theta: ArrayLike, theta_dot: ArrayLike) -> Array:
         """Return the motor torques needed at constant motor rates [N m], (..., 2)."""
         theta, w = _pairs(theta=theta, theta_dot=theta_dot)
-        return np.stack(self._chain.bias(self._chain.pose(*_split(theta)), *_split(w)), axis=-1)
+        return np.stack(self._chain.bias(self._chain.pose(*split(theta)), *split(w)), axis=-1)
 
     def forward(
         self,
@@ -111,16 +111,18 @@ class LegDynamics:
         check_number("friction", friction, "N m", low=0.0)
         force = (0.0, 0.0) if foot_force is None else foot_force
         theta, w, tau, F = _pairs(theta=theta, theta_dot=theta_dot, tau=tau, foot_force=force)
-        p = self._chain.pose(*_split(theta))
+        p = self._chain.pose(*split(theta))
         # Coulomb friction works against the motion; at rest sign(0) = 0 leaves it out.
-        driven = _split(tau - friction * np.sign(w))
-        return np.stack(self._chain.accelerations(p, _split(w), driven, _split(F)), axis=-1)
+        driven = tau - friction * np.sign(w)
+        # Not plain numbers, which raise an error where the links are too light to divide by.
+        torque = driven[..., 0], driven[..., 1]
+        return np.stack(self._chain.accelerations(p, split(w), torque, split(F)), axis=-1)
 
     def energy(self, theta: ArrayLike, theta_dot: ArrayLike) -> Energy:
         """Return the kinetic and the potential energy [J], each (...)."""
         theta, w = _pairs(theta=theta, theta_dot=theta_dot)
-        p = self._chain.pose(*_split(theta))
-        w1, w4 = _split(w)
+        p = self._chain.pose(*split(theta))
+        w1, w4 = split(w)
         rates = w1, p.a2 * w1 + p.b2 * w4, p.a3 * w1 + p.b3 * w4, w4
         kinetic, potential = self._chain.energies(p, rates)
         return Energy(np.asarray(kinetic), np.asarray(potential))
@@ -128,7 +130,7 @@ class LegDynamics:
     def reflected_inertia(self, theta: ArrayLike) -> Array:
         """Return the inertia that the world feels at the foot [kg], (..., 2, 2)."""
         (theta,) = _pairs(theta=theta)
-        p = self._chain.pose(*_split(theta))
+        p = self._chain.pose(*split(theta))
         # Where the foot cannot move in some direction the world feels an infinite mass.
         rho = float(np.hypot(*self.leg.foot_offset))
         reach = cross(p.e1, placed(p.e2, self.leg.foot_offset)) / rho
@@ -198,8 +200,3 @@ def _chain(leg: FiveBar, assembly: int | None, payload: float) -> Chain:
 def _pairs(**values: ArrayLike) -> list[Array]:
     """Return the values broadcast to finite pairs (..., 2); ArgumentError if they are not."""
     return broadcast(**{name: finite(as_pairs(v, name), name) for name, v in values.items()})
-
-
-def _split(pairs: Array) -> Vector:
-    """Return the two coordinates of pairs, each (...)."""
-    return pairs[..., 0], pairs[..., 1]

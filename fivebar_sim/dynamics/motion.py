@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 
 from fivebar_sim.arrays import Array, as_pairs, at, broadcast, finite, first_index
 from fivebar_sim.checks import check_number
-from fivebar_sim.dynamics.chain import Chain, Pose, Vector
+from fivebar_sim.dynamics.chain import Chain, Pose, Vector, split
 from fivebar_sim.errors import (
     ArgumentError,
     DivergedError,
@@ -205,21 +205,23 @@ class _Plant:
 
     def accelerations(self, t: float, q: Array, w: Array) -> Vector:
         """Return the two motor accelerations [rad/s^2]."""
-        p = self.chain.pose(q[..., 0], q[..., 1])
-        return self.driven(t, q, w, p, (w[..., 0], w[..., 1]))
+        p = self.chain.pose(*split(q))
+        return self.driven(t, q, w, p, split(w))
 
     def driven(self, t: float, q: Array, w: Array, p: Pose, rates: Vector) -> Vector:
         """Return the accelerations in a pose, whose rates are also given one by one."""
         tau = _evaluate(self.torque, "torque", t, q, w) or (0.0, 0.0)
         force = _evaluate(self.foot_force, "foot_force", t, q, w)
-        return self.chain.accelerations(p, rates, tau, force)
+        try:
+            return self.chain.accelerations(p, rates, tau, force)
+        except ZeroDivisionError:  # plain numbers raise it, arrays become infinite
+            raise _UnfitError("the links are too light: their mass matrix is 0") from None
 
     def slope(self, t: float, y: Array) -> Array:
         """Return dy/dt of one leg's y = (theta, theta_dot); NaN where the loop is open or singular.
 
         The error control then rejects a trial step beyond a fold of the loop and shortens it.
         """
-        # Plain numbers: arithmetic on NumPy's takes three times as long.
         theta_A, theta_E, w_A, w_E = y.tolist()
         if not (math.isfinite(theta_A) and math.isfinite(theta_E)):
             return np.full(4, np.nan)
@@ -229,8 +231,6 @@ class _Plant:
             alpha = self.driven(t, y[:2], y[2:], p, (w_A, w_E))
         except (LoopOpenError, SingularError):
             return np.full(4, np.nan)
-        except ZeroDivisionError:
-            raise _UnfitError("the links are too light: their mass matrix is 0") from None
         return np.array([w_A, w_E, *alpha])
 
 
@@ -243,10 +243,7 @@ def _evaluate(law: Law | None, name: str, t: float, q: Array, w: Array) -> Vecto
         raise _UnfitError(f"{name} is not finite")
     if value.shape != q.shape:
         value = _broadcast(value, name, q.shape)
-    if value.ndim == 1:
-        x, z = value.tolist()
-        return x, z
-    return value[..., 0], value[..., 1]
+    return split(value)
 
 
 def _broadcast(value: Array, name: str, shape: tuple[int, ...]) -> Array:
@@ -314,7 +311,8 @@ def _step(plant: _Plant, t: float, q: Array, w: Array, h: float) -> tuple[Array,
 
 def _stack_accelerations(plant: _Plant, t: float, q: Array, w: Array) -> Array:
     """Return the accelerations of all legs, (..., 2)."""
-    return np.stack(plant.accelerations(t, q, w), axis=-1)
+    alpha = plant.accelerations(t, q, w)
+    return np.array(alpha) if q.ndim == 1 else np.stack(alpha, axis=-1)
 
 
 def _dop853(plant: _Plant, y: Array, times: Array, rtol: float, atol: float) -> Array:
