@@ -18,6 +18,7 @@ from fivebar_sim.geometry import FiveBar
 from fivebar_sim.metrics.guards import Guard
 from fivebar_sim.rollout import Result
 from fivebar_sim.scenario import Scenario
+from fivebar_sim.simulation import sampling
 from fivebar_sim.simulation.sampling import FINER, Hold, Plant, Stability, growth
 
 M = 2e-5  # [kg m^2]
@@ -136,6 +137,30 @@ def test_stable_feedback_passes(settings: list[str]) -> None:
 def test_planned_setpoints_have_no_such_guard() -> None:
     result = rollout.run(Scenario.load("classic-ellipse", ["duration=0.75"]))
     assert feedback(result) is None
+
+
+class Stiffening(msgspec.Struct, frozen=True):
+    """Looks at the time: from 0.3 s on its spring is the stiffer the later it is."""
+
+    drive: ClassVar[Drive] = "torque"
+    period: float = 0.001
+
+    def command(self, leg: FiveBar, servo: Servo, seen: Observation, wanted: Reference) -> Array:
+        """Return the torques of a damped spring [N m], (nsim, 2)."""
+        del leg, servo
+        kp = 1.0 + seen.time if seen.time > 0.3 else 1.0
+        return kp * (wanted.theta - seen.theta) - 0.01 * seen.theta_dot
+
+
+def test_slopes_are_those_of_the_time_of_each_pose() -> None:
+    scenario = Scenario.load("classic-ellipse", ["limits={}"]).driven_by(Stiffening())
+    plan = rollout.plan(scenario)
+    k = np.array([100, 400, 700])
+    theta = plan.motion.q[k][:, ::2]
+    rate = plan.motion.q_dot[k][:, ::2]
+    found = sampling._slopes(scenario, Stiffening(), plan.motion, k, theta, rate)
+    for slope, kp in zip(found, (1.0, 1.4, 1.7), strict=True):
+        np.testing.assert_allclose(slope, slopes(kp, 0.01)[0], rtol=0, atol=1e-8)
 
 
 class Shy(msgspec.Struct, frozen=True):

@@ -142,15 +142,13 @@ def stability(
     k = asked[np.unique(np.linspace(0, len(asked) - 1, POSES).astype(int))]
     try:
         M = dynamics.mass_matrix(scenario.leg, theta[k - 1], payload=wanted.payload)
-        slopes = [
-            _slopes(scenario, controller, wanted, i, theta[i - 1], theta_dot[i - 1]) for i in k
-        ]
+        slopes = _slopes(scenario, controller, wanted, k, theta[k - 1], theta_dot[k - 1])
     except FiveBarError:
         return None
 
     servo = scenario.servo
     angles = controller.drive == "position"
-    F = np.stack(slopes) * (servo.kp if angles else 1.0)
+    F = slopes * (servo.kp if angles else 1.0)
     if not angles:
         # The driver makes up for the back-EMF of the rate that it measures, until the next command.
         F[:, :, 2:] += servo.back_emf * np.eye(2)
@@ -160,30 +158,59 @@ def stability(
     return Stability(wanted.time[k], real, shown)
 
 
+class _NoTime:
+    """The time of poses that are shown together, which have none in common: any use fails."""
+
+    def __bool__(self) -> bool:
+        raise TypeError("there is no one time")
+
+    __eq__ = __bool__  # pyright: ignore[reportAssignmentType]
+    __hash__ = None  # pyright: ignore[reportAssignmentType]
+
+
 def _slopes(
     scenario: Scenario,
     controller: Feedback,
     wanted: Motion,
-    k: int,
+    k: NDArray[np.int64],
     theta: Array,
     theta_dot: Array,
 ) -> Array:
-    """Return how a command changes with the angles and rates that it is shown, (2, 4).
+    """Return how commands change with the angles and rates that they are shown, (n, 2, 4).
+
+    Args:
+        scenario: The scenario that was run.
+        controller: Its controller.
+        wanted: Its planned motion.
+        k: Steps, (n,).
+        theta: (theta_A, theta_E) at them [rad], (n, 2).
+        theta_dot: Their rates [rad/s], (n, 2).
 
     Raises:
         FiveBarError: The controller has no answer close by.
     """
-    shown = np.tile(np.concatenate([theta, theta_dot]), (8, 1))
     change = np.repeat([ANGLE, RATE], 2)
-    shown[:4] += np.diag(change)
-    shown[4:] -= np.diag(change)
+    beside = np.concatenate([np.diag(change), -np.diag(change)])
+    shown = np.concatenate([theta, theta_dot], axis=1)[:, None] + beside
 
-    seen = Observation(k * scenario.sim.timestep, shown[:, :2], shown[:, 2:])
-    answer = _answer(scenario, controller, seen, _reference(wanted, k, 8))
-    # Asked beside its own states it may answer what a run would refuse.
-    if not is_numbers(answer, (8, 2)) or not np.isfinite(answer).all():
-        raise FiveBarError("no answer close by")
-    return ((answer[:4] - answer[4:]) / (2.0 * change[:, None])).T
+    def asked(rows: slice, time: Any) -> Array:
+        """Return the answers in some poses, (m, 8, 2)."""
+        states = shown[rows].reshape(-1, 4)
+        seen = Observation(time, states[:, :2], states[:, 2:])
+        answer = _answer(scenario, controller, seen, _reference(wanted, np.repeat(k[rows], 8)))
+        # Asked beside its own states it may answer what a run would refuse.
+        if not is_numbers(answer, (len(states), 2)) or not np.isfinite(answer).all():
+            raise FiveBarError("no answer close by")
+        return answer.reshape(-1, 8, 2)
+
+    try:
+        answers = asked(slice(None), _NoTime())
+    except FiveBarError:
+        # One that looks at the time is asked in one pose after the other.
+        times = (k * scenario.sim.timestep).tolist()
+        answers = np.concatenate([asked(slice(i, i + 1), t) for i, t in enumerate(times)])
+    rises = (answers[:, :4] - answers[:, 4:]) / (2.0 * change[:, None])
+    return np.swapaxes(rises, 1, 2)
 
 
 def accelerated(scenario: Scenario, wanted: Motion, k: int) -> Array:
@@ -194,7 +221,7 @@ def accelerated(scenario: Scenario, wanted: Motion, k: int) -> Array:
     controller = scenario.controller
     if not isinstance(controller, Feedback):
         return np.zeros(2)
-    full = _reference(wanted, k, 1)
+    full = _reference(wanted, np.array([k]))
     still = np.zeros((1, 2))
     seen = Observation(k * scenario.sim.timestep, full.theta, full.theta_dot)
     less = full._replace(foot_ddot=still, theta_ddot=still)
@@ -217,11 +244,11 @@ def _answer(
     )
 
 
-def _reference(wanted: Motion, k: int, legs: int) -> Reference:
-    """Return the reference at step k, for some legs at once."""
+def _reference(wanted: Motion, k: NDArray[np.int64]) -> Reference:
+    """Return the references at some steps, for as many legs."""
     rows = [wanted.foot, wanted.foot_dot, wanted.foot_ddot]
     rows += [q[:, ::2] for q in (wanted.q, wanted.q_dot, wanted.q_ddot)]
-    fields = [np.tile(values[k], (legs, 1)) for values in (*rows, wanted.force)]
+    fields = [values[k] for values in (*rows, wanted.force)]
     return Reference(*fields, payload=wanted.payload)
 
 
