@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Literal
 
 import numpy as np
@@ -53,21 +54,30 @@ class Servo:
 
     def __call__(self, leg: Leg, path: Path, t: float, theta: Pair, theta_dot: Pair) -> Pair:
         """Return (tau_A, tau_E) [N m]."""
-        p, v, a = (complex(*x) for x in path(t))
-        ahead = [0.0, 0.0]  # kp (u - theta_ref) [N m]
-        if self.feedforward == "none":
-            psi = oracle.pose(leg, p)
-        else:
-            psi, rate, acceleration = oracle.angles_of(leg, p, v, a)
-            ahead = [self.kd * rate[0], self.kd * rate[3]]
-            if self.feedforward == "dynamics":
-                tau_ref = oracle.torques_of(leg, psi, rate, acceleration)
-                ahead = [x + y for x, y in zip(ahead, tau_ref, strict=True)]
+        theta_ref, ahead = _reference(leg, path, t, self.kd, self.feedforward)
         tau = []
-        for ref, extra, q, q_dot in zip((psi[0], psi[3]), ahead, theta, theta_dot, strict=True):
+        for ref, extra, q, q_dot in zip(theta_ref, ahead, theta, theta_dot, strict=True):
             pull = self.kp * math.remainder(ref - q, 2.0 * math.pi) + extra
             tau.append(min(max(pull - self.kd * q_dot, -self.limit), self.limit))
         return tau
+
+
+@lru_cache(maxsize=16)  # an integrator asks for the same time again and again
+def _reference(
+    leg: Leg, path: Path, t: float, kd: float, feedforward: str
+) -> tuple[Pair, list[float]]:
+    """Return theta_ref [rad], and kp (u - theta_ref) [N m]; see `Servo`."""
+    p, v, a = (complex(*x) for x in path(t))
+    if feedforward == "none":
+        psi = oracle.pose(leg, p)
+        return (psi[0], psi[3]), [0.0, 0.0]
+
+    psi, rate, acceleration = oracle.angles_of(leg, p, v, a)
+    ahead = [kd * rate[0], kd * rate[3]]
+    if feedforward == "dynamics":
+        tau_ref = oracle.torques_of(leg, psi, rate, acceleration)
+        ahead = [x + y for x, y in zip(ahead, tau_ref, strict=True)]
+    return (psi[0], psi[3]), ahead
 
 
 @dataclass(frozen=True, slots=True)

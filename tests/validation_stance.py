@@ -31,6 +31,7 @@ TRUNK = 0.5  # [kg]
 SQUAT = 1e-12
 """Width of the squat [m]: an ellipse's radii are above 0."""
 DURATION = 1.25  # [s]: the ramp and two squats
+ONCE = 0.75  # [s]: the ramp and one
 FIRST = round(air.RAMP / air.TIMESTEPS[0])
 GRID: Array = air.TIMESTEPS[0] * np.arange(1, round(DURATION / air.TIMESTEPS[0]) + 1.0)
 HARD = (5e-4, 1.0), (0.95, 0.99, 0.001)
@@ -73,11 +74,11 @@ def squat(leg: FiveBar) -> Ellipse:
     return Ellipse(centre=(x, z + deep), radii=(SQUAT, deep), frequency=frequency, ramp=air.RAMP)
 
 
-def planned(key: Key, *, grips: bool = False) -> Plan:
-    """Return the plan of a preset's squat."""
+def planned(key: Key, *, grips: bool = False, duration: float = DURATION) -> Plan:
+    """Return the plan of a preset's squat, duration [s] long."""
     leg = FiveBar.load(key.preset)
     scene = Rail(mass=TRUNK, friction=1.0 if grips else 0.0)
-    return rollout.plan(air.scenario(leg, squat(leg), gains(leg), key, scene, DURATION))
+    return rollout.plan(air.scenario(leg, squat(leg), gains(leg), key, scene, duration))
 
 
 def harden(plan: Plan) -> Plan:
@@ -88,23 +89,27 @@ def harden(plan: Plan) -> Plan:
 
 
 @cache
-def truth(preset: str, feedforward: str) -> Stance:
-    """Return the oracle's squat of a preset on a floor without friction."""
-    return _truth(preset, feedforward, grips=False, start=None)
+def truth(preset: str, feedforward: str, duration: float) -> Stance:
+    """Return the oracle's squat of a preset on a floor without friction, duration [s] long."""
+    return _truth(preset, feedforward, duration, grips=False, start=None)
 
 
-def _truth(preset: str, feedforward: str, *, grips: bool, start: complex | None) -> Stance:
+def _truth(
+    preset: str, feedforward: str, duration: float, *, grips: bool, start: complex | None
+) -> Stance:
     leg = FiveBar.load(preset)
     ground = oracle_stance.Ground(TRUNK, leg.foot_radius, grips)
     law = air.servo_of(gains(leg), feedforward)
     path = air.path_of(squat(leg))
-    return oracle_stance.simulate(oracle.Leg.of(leg), ground, law, path, GRID, start=start)
+    times = GRID[: round(duration / air.TIMESTEPS[0])]
+    return oracle_stance.simulate(oracle.Leg.of(leg), ground, law, path, times, start=start)
 
 
-def measure(key: Key, *, hard: bool = False) -> Error:
-    """Return the errors of a squat without friction."""
-    plan = planned(key)
-    return _compared(rollout.execute(harden(plan) if hard else plan), truth(key[0], key[2]))
+def measure(key: Key, *, hard: bool = False, duration: float = DURATION) -> Error:
+    """Return the errors of a squat without friction, duration [s] long."""
+    plan = planned(key, duration=duration)
+    known = truth(key.preset, key.feedforward, duration)
+    return _compared(rollout.execute(harden(plan) if hard else plan), known)
 
 
 class Grip(NamedTuple):
@@ -140,7 +145,7 @@ def grip(key: Key, impratio: float) -> Grip:
     for _ in range(3):  # F_x moves the ball by nearly as much: three rounds are enough
         psi = oracle.pose(oracle.Leg.of(leg), foot)
         foot += wanted - float(_rolled(leg, np.array(foot.real), np.array(psi[1])))
-    known = _truth(key.preset, key.feedforward, grips=True, start=foot)
+    known = _truth(key.preset, key.feedforward, DURATION, grips=True, start=foot)
     side = known.ground[FIRST:, 0]
     off = float(air.rms(record["ground_x"] - side))
     return Grip(_compared(result, known), float(air.rms(side)), off, float(rate))
