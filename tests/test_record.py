@@ -47,7 +47,7 @@ WHOLE_SERVO = (
 
 @cache
 def done(kind: str, *settings: str) -> tuple[Plan, Result]:
-    base = ["limits={}", "duration=0.6", "path.frequency=4", "path.ramp=0.1"]
+    base = ["limits={}", "duration=0.35", "path.frequency=4", "path.ramp=0.1"]
     plan = rollout.plan(Scenario.load("classic-ellipse", [*base, *SCENES[kind], *settings]))
     return plan, rollout.execute(plan)
 
@@ -77,11 +77,11 @@ def test_columns_of_every_scene(kind: str, more: list[str]) -> None:
     plan, result = done(kind)
     assert list(result.record) == [*COLUMNS, *more]
     for name, column in result.record.items():
-        assert column.shape == (600,), name
+        assert column.shape == (350,), name
         assert column.dtype == np.float64
         assert column.flags.c_contiguous
         assert np.isfinite(column).all()
-    np.testing.assert_array_equal(result.record["time"], np.arange(1, 601) * 1e-3)
+    np.testing.assert_array_equal(result.record["time"], np.arange(1, 351) * 1e-3)
     assert plan.model.nu == 2 + 2 * (kind == "payload")
 
 
@@ -149,7 +149,7 @@ def test_load_in_stance_without_a_ground_is_that_of_the_plan() -> None:
     plan, result = done("air", GAIT)
     window = plan.scenario.window
     h = 1e-3
-    cycle = ((np.arange(600) * h - 0.05) * 4 + 0.25) % 1.0  # half its ramp of 0.1 s late
+    cycle = ((np.arange(350) * h - 0.05) * 4 + 0.25) % 1.0  # half its ramp of 0.1 s late
     tau = pair(result, "torque")[window]
     rms = np.sqrt(np.mean(tau[(cycle < 0.5 - 1e-9)[window]] ** 2, axis=0))
     measured = result.metrics["load"]["stance"]["torque_rms"]
@@ -235,9 +235,10 @@ def test_refusal_of_limits_on_a_ground_that_is_not_there(kind: str, key: str) ->
         ["controller.name=pd", "sensors.noise=1e-4", "sensors.delay=0.001", "sim.seed=3"],
     ],
 )
+@pytest.mark.usefixtures("light")
 def test_resolved_scenario_runs_again_to_the_same_bits(shell: Shell, settings: list[str]) -> None:
     (shell.folder / "push.csv").write_text(FORCE, encoding="utf-8")
-    changes = [word for setting in settings for word in ("--set", setting)]
+    changes = [word for setting in ["duration=0.35", *settings] for word in ("--set", setting)]
     assert shell("run", "short.toml", "--out", "one", *changes).err == ""
     (shell.folder / "push.csv").unlink()
     assert shell("run", "one/scenario.toml", "--out", "two").status == 0
@@ -250,6 +251,7 @@ def test_resolved_scenario_runs_again_to_the_same_bits(shell: Shell, settings: l
     assert texts[0] == texts[1]
 
 
+@pytest.mark.usefixtures("light")
 def test_csv_force_is_copied_beside_under_a_name_of_its_own(shell: Shell) -> None:
     """Also where the path's CSV has the same name."""
     folder = shell.folder
@@ -267,6 +269,7 @@ def test_csv_force_is_copied_beside_under_a_name_of_its_own(shell: Shell) -> Non
     assert (folder / "run" / "force-foot.csv").read_text("utf-8") == FORCE
 
 
+@pytest.mark.usefixtures("light")
 def test_ground_is_shown_where_there_is_one(shell: Shell) -> None:
     said = shell("run", "short.toml", "--set", "scene=rail", "--out", "a").out
     assert "time in stance" in said
