@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import re
 import subprocess
 from pathlib import Path
 
 import pytest
-from firmware_builds import HERE, M4F, TARGETS, need, run, source
+from firmware_builds import HERE, M4F, need, run, source
 
 from fivebar_sim.certify import dialogue, judge, suite
 
@@ -48,7 +47,11 @@ def test_cppcheck_finds_nothing(double: tuple[str, ...]) -> None:
     run("cppcheck", "--quiet", "--error-exitcode=1", "--std=c99", what, *one, source())
 
 
-@pytest.mark.parametrize("switch", [(), ("-DFIVEBAR_SQRT_BY_DIGITS",)])
+BY_DIGITS = ("-DFIVEBAR_SQRT_BY_DIGITS",)
+"""The other way that the source has of a square root."""
+
+
+@pytest.mark.parametrize("switch", [(), pytest.param(BY_DIGITS, marks=pytest.mark.long)])
 def test_sanitizers_find_nothing(switch: tuple[str, ...], tmp_path: Path) -> None:
     need("cc")
     program = tmp_path / "bits"
@@ -58,12 +61,15 @@ def test_sanitizers_find_nothing(switch: tuple[str, ...], tmp_path: Path) -> Non
     run(program, "0", "3000", "3000")
 
 
-def test_sanitizers_find_nothing_over_the_conformance_set(tmp_path: Path) -> None:
+@pytest.mark.parametrize("switch", [BY_DIGITS, pytest.param((), marks=pytest.mark.long)])
+def test_sanitizers_find_nothing_over_the_conformance_set(
+    switch: tuple[str, ...], tmp_path: Path
+) -> None:
     need("cc")
     program = tmp_path / "certified"
     include = f"-I{source().parent}"
     speaker = Path(__file__).parent / "leg_programs" / "firmware.c"
-    run("cc", "-O0", *SAFE, include, speaker, source(), "-o", program)
+    run("cc", "-O0", *SAFE, *switch, include, speaker, source(), "-o", program)
     legs = suite.load()
     # What a sanitizer finds ends the program, and its answers with it.
     report = judge.judge(legs, dialogue.ask([str(program)], judge.questions(legs), 60.0))
@@ -85,16 +91,6 @@ def test_inverse_and_forward_are_small_on_a_cortex_m4f(tmp_path: Path) -> None:
     assert 1000 < int(text) <= MOST_BYTES
 
 
-# WebAssembly is linked without any library; a Cortex-M0 has all float arithmetic in one.
-@pytest.mark.parametrize("target", sorted(set(TARGETS) - {"wasm", "cortex-m0"}))
-def test_it_calls_no_library(target: str, tmp_path: Path) -> None:
-    need(*TARGETS[target].needs)
-    TARGETS[target].build(tmp_path, ())
-    missing = re.findall(r" U (\w+)", run(_nm(target), tmp_path / "leg.o"))
-    # What linkers provide themselves.
-    assert set(missing) <= {"_GLOBAL_OFFSET_TABLE_", "__stack_chk_fail"}
-
-
 @pytest.mark.parametrize("flag", ["-ffast-math", "-ffinite-math-only", "-Ofast"])
 def test_arithmetic_that_is_not_ieee_is_refused(flag: str, tmp_path: Path) -> None:
     need("cc")
@@ -102,9 +98,3 @@ def test_arithmetic_that_is_not_ieee_is_refused(flag: str, tmp_path: Path) -> No
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode != 0
     assert "needs IEEE arithmetic" in done.stderr
-
-
-def _nm(target: str) -> str:
-    """Return the program that lists a target's symbols."""
-    prefix = TARGETS[target].needs[0].removesuffix("gcc")
-    return "nm" if target in ("host", "clang") else f"{prefix}nm"
