@@ -25,14 +25,16 @@ from fivebar_sim.simulation import feedback
 
 H = 1e-3
 ASIDE = ["duration=0.4", "path.frequency=4", "path.ramp=0.1", "limits={}"]
-BRIEF = ["duration=0.2", "path.frequency=8", "path.ramp=0.05"]  # where only the bits matter
+BRIEF = ["duration=0.1", "path.frequency=16", "path.ramp=0.03", "path.radii=[0.004,0.002]"]
+"""Where only the bits matter."""
+
 LEGS = [  # unlike, but of one timestep, length and control period
     ["controller.name=pd"],
     ["controller.name=pd", "sensors={noise=1e-3, rate_noise=0.1}", "sim.seed=7"],
     ["controller.name=pd", "sensors={noise=1e-3, rate_noise=0.1}", "sim.seed=8"],
     ["controller.name=pd", "controller.derivative=error", "sensors={delay=0.001}"],
     ["controller.name=computed_torque", "leg.L2=0.065"],
-    ["controller.name=computed_torque", "path.radii=[0.02,0.009]"],
+    ["controller.name=computed_torque", "path.radii=[0.005,0.002]"],
     ["controller.name=computed_torque", "servo={preset='xl330', limit=1.0}"],
     ["controller.name=impedance", "leg={L1=0.04, L2=0.06, L3=0.055, L4=0.045, L5=0.03}"],
     ["controller.name=impedance", "servo={limit=0.02, delay=0.002}", "sim.integrator=implicitfast"],
@@ -157,7 +159,7 @@ def test_batch_of_payloads_and_forces_has_the_bits_of_each_alone() -> None:
 def test_many_like_legs_are_one_call_and_keep_their_bits() -> None:
     """Thirty-three legs in one array of poses: no sum depends on how many are in it."""
     plans = [
-        planned("duration=0.1", "controller.name=computed_torque", f"sim.seed={i}",
+        planned("duration=0.06", "controller.name=computed_torque", f"sim.seed={i}",
                 "sensors.noise=1e-5", f"path.frequency={25.0 + 0.1 * i}", "path.ramp=0.02")
         for i in range(33)
     ]  # fmt: skip
