@@ -9,6 +9,7 @@ import sys
 import tomllib
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 from xml.etree import ElementTree
 
 import pytest
@@ -53,7 +54,10 @@ def repository(tmp_path: Path, without_pandas: None) -> Path:
 
 @pytest.fixture
 def session(
-    repository: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+    repository: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capfd: pytest.CaptureFixture[str],
+    light: None,
 ) -> Session:
     """Return a function that runs tests in a repository and returns what pytest said.
 
@@ -268,7 +272,18 @@ def test_range(leg_run):
     assert len(list(folder.iterdir())) == 4
 
 
-def test_runs_of_a_test_and_its_fixture_are_kept_once(session: Session, tmp_path: Path) -> None:
+def test_runs_of_a_test_and_its_fixture_are_kept_once(
+    session: Session, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    png = look.png
+    drawn: list[bytes] = []  # a real picture, the same for all
+
+    def once(figure: Any) -> bytes:
+        if not drawn:
+            drawn.append(png(figure))
+        return drawn[0]
+
+    monkeypatch.setattr(look, "png", once)
     said = session(
         """
 import pytest

@@ -17,12 +17,14 @@ from fivebar_sim.recording.check import read_through
 from fivebar_sim.runs import recording_file
 from fivebar_sim.scenario import Scenario
 
+BRIEF = ["duration=0.35", "path.frequency=4", "path.ramp=0.1"]
+
 
 @pytest.fixture(scope="module")
 def written(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return the directory of a short run."""
     folder = tmp_path_factory.mktemp("runs")
-    result = rollout.run(Scenario.load("classic-ellipse", ["duration=0.8"]))
+    result = rollout.run(Scenario.load("classic-ellipse", BRIEF))
     return result.write(folder / "short")
 
 
@@ -84,7 +86,7 @@ def test_one_that_cannot_be_read_is_rebuilt(
 
 
 def test_the_recording_of_another_run_is_rebuilt(run: Path, content: str) -> None:
-    other = rollout.run(Scenario.load("classic-ellipse", ["duration=0.8", "servo.kp=20.0"]))
+    other = rollout.run(Scenario.load("classic-ellipse", [*BRIEF, "servo.kp=20.0"]))
     own = run / "recording.rrd"
     shutil.copy(other.write(run.parent / "other") / "recording.rrd", own)
     assert digest(own) != content
