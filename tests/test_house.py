@@ -8,7 +8,8 @@ import importlib.util
 import subprocess
 import sys
 import warnings
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
+from functools import cache
 from pathlib import Path
 
 import house
@@ -72,13 +73,16 @@ def name(path: Path) -> str:
     return path.relative_to(ROOT).as_posix()
 
 
-def imports(source: str) -> Iterator[str]:
-    """Yield the top-level names of all modules that a source imports, anywhere in it."""
+@cache
+def imports(source: str) -> list[str]:
+    """Return the top-level names of all modules that a source imports, anywhere in it."""
+    found = []
     for node in house.within(house.parsed(source)):
         if isinstance(node, ast.Import):
-            yield from (alias.name.split(".")[0] for alias in node.names)
+            found += [alias.name.split(".")[0] for alias in node.names]
         elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
-            yield node.module.split(".")[0]
+            found.append(node.module.split(".")[0])
+    return found
 
 
 def examples_set(source: str) -> set[str]:
@@ -196,7 +200,7 @@ def test_only_what_has_an_extra_for_it_imports_scipy() -> None:
 
 def test_package_never_imports_controllers() -> None:
     lazy = "def f():\n    from fivebar_controllers.x import y, z\n"
-    assert list(imports(lazy)) == ["fivebar_controllers"]
+    assert imports(lazy) == ["fivebar_controllers"]
     for path in (ROOT / "fivebar_sim").rglob("*.py"):
         source = path.read_text(encoding="utf-8")
         found = set(imports(source)) if "fivebar_controllers" in source else set()
