@@ -45,10 +45,11 @@ def test_two_of_each_together_on_two_threads(alone: list[Result]) -> None:
         same_bits(together[2 * i + 1], result)
 
 
-def test_by_plain_steps(alone: list[Result], monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("every", [3, pytest.param(1, marks=pytest.mark.long)])
+def test_by_plain_steps(alone: list[Result], every: int, monkeypatch: pytest.MonkeyPatch) -> None:
     """One mj_step after the other, as whoever has no `mujoco.batch` would write it."""
     monkeypatch.setattr(steps, "Batch", runpy.run_path(str(WORKER))["Plain"])
-    for result in alone:
+    for result in alone[::every]:
         same_bits(rollout.run(result.scenario), result)
 
 
