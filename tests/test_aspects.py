@@ -57,7 +57,7 @@ def test_foot_and_angles_name_one_aspect(batch: tuple[int, ...], mode: Mode, ass
 def test_a_walk_that_meets_no_singularity_stays_in_its_aspect(
     leg: FiveBar, rng: np.random.Generator
 ) -> None:
-    ends = rng.uniform(-1.0, 1.0, (2, 400, 1, 2)) * leg.size
+    ends = rng.uniform(-1.0, 1.0, (2, 200, 1, 2)) * leg.size
     walks = ends[0] + (ends[1] - ends[0]) * np.linspace(0.0, 1.0, 60)[:, None]
     stayed = 0
     for mode in MODES:
@@ -71,7 +71,7 @@ def test_a_walk_that_meets_no_singularity_stays_in_its_aspect(
             assert told.mean() > 0.99
             assert same_aspect(leg, p, q, mode=mode)[told].all()
             stayed += int(clear.sum())
-    assert stayed > 40
+    assert stayed > 20
 
 
 def test_other_assembly_is_another_aspect() -> None:
@@ -165,7 +165,7 @@ def test_one_triple_two_aspects_in_one_workspace() -> None:
     every = all_aspects(CLASSIC)
     of = (every.s_A == -1) & (every.s_E == 1) & (every.assembly == 1)
     assert every.part[of].tolist() == [1, 2]
-    line = np.linspace(-1.0, 1.0, 201) * CLASSIC.size
+    line = np.linspace(-1.0, 1.0, 101) * CLASSIC.size
     foot = np.stack(np.meshgrid(line, line, indexing="ij"), axis=-1)
     foot = foot[assemblies(CLASSIC, foot, (-1, 1)) == 1]
     count = np.bincount(aspect_at(CLASSIC, foot, mode=(-1, 1)).part)
