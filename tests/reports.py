@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from html.parser import HTMLParser
 from pathlib import Path
 from typing import NamedTuple
+
+import pytest
 
 from fivebar_sim.report import in_plane, over_time
 from fivebar_sim.report.draw import Drawn
@@ -76,3 +80,13 @@ def two_figures(run: StoredRun) -> list[Drawn]:
     """Return the figures of one in the plane and one over time, without drawing the others."""
     drawn = [in_plane.foot_path(run), over_time.tracking_error(run)]
     return [one for one in drawn if one is not None]
+
+
+@contextmanager
+def unfitted() -> Iterator[None]:
+    """Draw figures without fitting their axes to their words, which takes half of the time."""
+    from matplotlib.layout_engine import ConstrainedLayoutEngine
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(ConstrainedLayoutEngine, "execute", lambda engine, figure: None)
+        yield
