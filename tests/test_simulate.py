@@ -54,7 +54,7 @@ def balance(plan: Plan) -> tuple[np.ndarray, np.ndarray]:
 @pytest.mark.parametrize("limit", [None, 0.05, 0.00283])
 @pytest.mark.parametrize("integrator", INTEGRATORS)
 def test_torque_balances_momentum_at_every_step(integrator: str, limit: float | None) -> None:
-    settings = [f"sim.integrator={integrator}", "duration=0.5", "path.ramp=0.1"]
+    settings = [f"sim.integrator={integrator}", "duration=0.35", "path.ramp=0.1"]
     settings += ["path.frequency=4.0"]
     settings += [f"servo.limit={limit}"] if limit else []
     plan = planned(*settings)
@@ -71,20 +71,20 @@ def simulated(plan: Plan) -> States:
 
 def test_raw_sensor_is_not_the_torque() -> None:
     """The actuator sensor misses what the integrator adds: the reason for `applied_torque`."""
-    plan = planned()
+    plan = planned("duration=0.75")
     batch = Batch(plan.model, 1, 1)
     batch.qpos = plan.motion.q[:1]
-    raw = batch.rollout(4000, plan.ctrl[None], record=("actuator_force",))["actuator_force"][0]
+    raw = batch.rollout(750, plan.ctrl[None], record=("actuator_force",))["actuator_force"][0]
     torque = rollout.execute(plan).record["torque_A"]
     assert np.sqrt(np.mean((raw[:, 0] - torque) ** 2)) > 10 * np.sqrt(np.mean(torque**2))
 
 
 def test_batch_is_bit_identical_to_one_by_one() -> None:
     legs = [
-        planned("duration=0.4", "path.ramp=0.1",
+        planned("duration=0.35", "path.ramp=0.1",
                 f"leg.L2={0.055 + 0.001 * i}", f"path.frequency={4 + 0.05 * i}",
                 f"servo.kp={6.0 + 0.1 * i}", f"sim.integrator={INTEGRATORS[i % 2]}")
-        for i in range(16)
+        for i in range(10)
     ]  # fmt: skip
     every = [rollout.execute(plan) for plan in legs]
     for nthread in (1, 2):
