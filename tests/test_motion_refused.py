@@ -127,7 +127,7 @@ def disagreements(seed: int, count: int) -> tuple[list[str], int]:
 
 
 def test_refused_exactly_where_the_check_refuses() -> None:
-    wrong, planned = disagreements(1, 60)
+    wrong, planned = disagreements(3, 60)
     assert wrong == []
     assert 8 < planned < 52  # neither all nor none
 
