@@ -17,10 +17,20 @@ BASELINE = Path("baselines/short.json")
 FAST = ("classic-ellipse", "classic-figure-eight", "payload-ellipse", "q8bot-trot", "rail-hop")
 
 
+pytestmark = pytest.mark.usefixtures("light")
+
+MADE: list[bytes] = []
+"""The baseline of short.toml, once it was made."""
+
+
 @pytest.fixture
 def recorded(shell: Shell) -> Shell:
     """A shell in a folder where short.toml has a baseline."""
-    assert shell("check", "short.toml", "--update").status == 0
+    if not MADE:
+        assert shell("check", "short.toml", "--update").status == 0
+        MADE.append(BASELINE.read_bytes())
+    BASELINE.parent.mkdir(exist_ok=True)
+    BASELINE.write_bytes(MADE[0])
     return shell
 
 
@@ -42,11 +52,11 @@ def test_update_records_and_says_so(shell: Shell) -> None:
 
 def test_repeats_never_alarm_and_give_equal_files(recorded: Shell) -> None:
     outputs = []
-    for i in range(5):
+    for i in range(3):
         said = recorded("check", "short.toml", "--junit", f"{i}.xml", "--summary", f"{i}.md")
         assert (said.status, said.err) == (0, "")
         outputs.append((said.out, Path(f"{i}.xml").read_bytes(), Path(f"{i}.md").read_bytes()))
-    assert outputs == 5 * outputs[:1]
+    assert outputs == 3 * outputs[:1]
     assert "note" not in outputs[0][0]
     assert "runs" not in recorded.names()
 
