@@ -18,6 +18,8 @@ from fivebar_sim.recording import rrd
 from fivebar_sim.report import single
 from fivebar_sim.runs.directory import FILES
 
+pytestmark = pytest.mark.usefixtures("light")
+
 FROM_CSV = ["--set", "path.kind=csv", "--set", "path.file=foot.csv"]
 DIVERGING = ["--set", "sim.integrator=implicitfast", "--set", "sim.timestep=0.02"]
 

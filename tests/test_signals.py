@@ -15,7 +15,7 @@ from contextlib import suppress
 from pathlib import Path
 
 import pytest
-from shell import Shell, started
+from shell import LIGHT, Shell, started
 
 from fivebar_sim.cli import program, signals
 from fivebar_sim.errors import ConfigError
@@ -79,7 +79,8 @@ def test_signal_ends_the_program_and_leaves_nothing(
 def test_ignored_interrupt_stays_ignored_and_the_other_signal_does_not(shell: Shell) -> None:
     for sent, status in ((signal.SIGINT, 0), (signal.SIGTERM, 143)):
         code = TOLD.format(then=f"signal.raise_signal({int(sent)})")
-        command = [sys.executable, "-c", code, "run", "short.toml", "--quiet", "--out", sent.name]
+        run = ["run", "short.toml", "--quiet", "--out", sent.name]
+        command = [sys.executable, "-c", LIGHT + code, *run]
         with started(command, signal.SIG_IGN) as process:
             assert process.communicate() == (b"", b"")
         assert process.returncode == status
