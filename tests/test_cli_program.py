@@ -51,7 +51,7 @@ def test_output_suits_its_reader(folder: Path) -> None:
     status, out, err = program(*odd, PYTHONIOENCODING="ascii")  # a whole run
     assert (status, err) == (0, "")
     assert "short: \\xe9 leg" in out
-    for command in (["run", "short.toml", "--json"], ["check", "short.toml"]):
+    for command in (["list"], ["check", "short.toml"]):
         with subprocess.Popen(
             [FIVEBAR, *command], stdout=subprocess.PIPE, stderr=subprocess.PIPE
         ) as process:
