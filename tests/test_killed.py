@@ -76,7 +76,7 @@ def killed(writer: Writer, times: int, seed: int) -> None:
 
 
 def test_killed_runs_are_whole_or_absent(writer: Writer) -> None:
-    killed(writer, 8, seed=1)
+    killed(writer, 5, seed=1)
 
 
 @pytest.mark.long

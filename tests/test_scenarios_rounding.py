@@ -98,7 +98,7 @@ def test_same_verdict_of_what_is_shipped(name: str) -> None:
 
 def test_bound_that_a_run_sits_on_is_seen() -> None:
     """With the energy's bound at just what it is, some of many runs are beyond it."""
-    settings = ["limits={}", "duration=1"]
+    settings = ["limits={}", "duration=0.75"]
     measured = rollout.run(Scenario.load("classic-ellipse", settings)).metrics["guards"]
     value = next(each["value"] for each in measured if each["name"] == "energy")
     edge = Scenario.load("classic-ellipse", [*settings, f"guards.energy={value!r}"])

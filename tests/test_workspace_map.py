@@ -48,13 +48,9 @@ def test_command_draws(
 
 
 def test_path_is_drawn(tmp_path: Path) -> None:
-    plain = tmp_path / "plain.svg"
     with_path = tmp_path / "path.svg"
-    assert main(["workspace", "classic", "--out", str(plain)]) == 0
     assert main(["workspace", "classic", "--out", str(with_path), "--path", "classic-ellipse"]) == 0
     assert colour("target") in with_path.read_text()
-    assert colour("singular") in plain.read_text()
-    assert colour("target") not in plain.read_text()
 
 
 def test_map_colours_the_distance_on_both_sides_of_the_edge() -> None:
@@ -152,7 +148,10 @@ def test_refusal_in_python(tmp_path: Path) -> None:
         workspace_map.write(FiveBar(), tmp_path / "map")
 
 
-def test_a_name_is_no_formula(tmp_path: Path) -> None:
+def test_a_name_is_no_formula_and_without_a_path_none_is_drawn(tmp_path: Path) -> None:
     out = tmp_path / "map.svg"
     workspace_map.write(FiveBar(name="$x^{$"), out)
-    assert "$x^{$" in out.read_text(encoding="utf-8")
+    drawn = out.read_text(encoding="utf-8")
+    assert "$x^{$" in drawn
+    assert colour("singular") in drawn
+    assert colour("target") not in drawn
