@@ -187,6 +187,12 @@ static fivebar_real magnitude(fivebar_real x)
     return x < REAL(0.0) ? -x : x;
 }
 
+/* Return the square root of a difference that rounding may have left below 0. */
+static fivebar_real positive_root(fivebar_real x)
+{
+    return square_root(x > REAL(0.0) ? x : REAL(0.0));
+}
+
 /* Return x less a whole number of quarter turns, whose count is stored; |x| is at most
  * FIVEBAR_LARGEST_ANGLE, and quarters_each is 1, or 4 for whole turns. */
 static fivebar_real reduce(fivebar_real x, fivebar_real per_radian, int quarters_each, int *count)
@@ -401,7 +407,7 @@ static int crank(const fivebar_chain *chain, const fivebar_real r[2], int s, fiv
         e[1] = REAL(0.0);
         return FIVEBAR_OK;
     }
-    root = (fivebar_real)s * square_root(p > REAL(0.0) ? p : REAL(0.0));
+    root = (fivebar_real)s * positive_root(p);
     e[0] = r[0] * n - r[1] * root;
     e[1] = r[1] * n + r[0] * root;
     return FIVEBAR_OK;
@@ -567,7 +573,7 @@ static int close_loop(const fivebar_leg *leg, const fivebar_real theta[2], int a
     }
     q = (leg->knee_knee.high - d2) * (d2 - leg->knee_knee.low);
     along = (d2 + leg->knee_knee.product) / (REAL(2.0) * d2);
-    across = square_root(q > REAL(0.0) ? q : REAL(0.0)) / (REAL(2.0) * d2);
+    across = positive_root(q) / (REAL(2.0) * d2);
     across = (fivebar_real)assembly * across;
     p->BC[0] = along * p->BD[0] - across * p->BD[1];
     p->BC[1] = along * p->BD[1] + across * p->BD[0];
@@ -730,23 +736,74 @@ int fivebar_reaches(const fivebar_leg *leg, const fivebar_real foot[2], int s_A)
 typedef struct {
     const fivebar_leg *leg;
     const fivebar_real *point; /* that the nearest one is wanted for */
+    fivebar_real away_A[2];    /* direction from A if the point is on it */
+    fivebar_real away_E[2];
     fivebar_real best[2];
     int found; /* whether there is a best one yet */
 } search;
 
+/* Take a candidate if the foot can be put there. */
+static int take(search *s, fivebar_real x, fivebar_real z)
+{
+    fivebar_real c[2];
+
+    c[0] = x;
+    c[1] = z;
+    if (fivebar_reaches(s->leg, c, 0) != FIVEBAR_OK) {
+        return 0;
+    }
+    s->best[0] = x;
+    s->best[1] = z;
+    s->found = 1;
+    return 1;
+}
+
 /* Take a candidate that is nearer than the best one: |p - best|^2 - |p - c|^2 as one product, which
- * keeps its digits where p is far away. */
-static void consider(search *s, const fivebar_real c[2])
+ * keeps its digits where p is far away. One that rounding put out of reach is moved by some units
+ * in the last place, doubled `nudges` times. */
+static void consider(search *s, const fivebar_real c[2], int nudges)
 {
     const fivebar_real *p = s->point;
     fivebar_real x = (c[0] - s->best[0]) * ((p[0] - s->best[0]) + (p[0] - c[0]));
     fivebar_real z = (c[1] - s->best[1]) * ((p[1] - s->best[1]) + (p[1] - c[1]));
+    fivebar_real step = EPSILON * (s->leg->to_foot.outer + s->leg->L5);
+    int k;
 
-    if ((!s->found || x + z > REAL(0.0)) && reaches(s->leg, c, 1)) {
-        s->best[0] = c[0];
-        s->best[1] = c[1];
-        s->found = 1;
+    if ((s->found && !(x + z > REAL(0.0))) || take(s, c[0], c[1])) {
+        return;
     }
+    for (; nudges > 0; nudges--) {
+        for (k = 0; k < 9; k++) {
+            if (take(s, c[0] + step * (fivebar_real)(k / 3 - 1),
+                     c[1] + step * (fivebar_real)(k % 3 - 1))) {
+                return;
+            }
+        }
+        step = REAL(2.0) * step;
+    }
+}
+
+/* Store the direction from a centre to the point; from the centre every direction is as near. */
+static void ray_to(const search *s, const fivebar_real centre[2], fivebar_real outer,
+                   const fivebar_real away[2], fivebar_real ray[2])
+{
+    fivebar_real x = s->point[0] - centre[0];
+    fivebar_real z = s->point[1] - centre[1];
+    fivebar_real d = square_root(x * x + z * z);
+    int off = d > REAL(4.0) * EPSILON * outer;
+
+    ray[0] = off ? x / d : away[0];
+    ray[1] = off ? z / d : away[1];
+}
+
+static void consider_circle(search *s, const fivebar_real centre[2], fivebar_real radius,
+                            const fivebar_real ray[2], int nudges)
+{
+    fivebar_real c[2];
+
+    c[0] = centre[0] + radius * ray[0];
+    c[1] = centre[1] + radius * ray[1];
+    consider(s, c, nudges);
 }
 
 /* Consider the points of one chain's two circles in the direction of the point. */
@@ -754,28 +811,12 @@ static void consider_circles(search *s, const fivebar_chain *chain, const fiveba
                              const fivebar_real away[2])
 {
     fivebar_real ray[2];
-    fivebar_real c[2];
-    fivebar_real d;
-    int k;
 
-    ray[0] = s->point[0] - centre[0];
-    ray[1] = s->point[1] - centre[1];
-    d = square_root(ray[0] * ray[0] + ray[1] * ray[1]);
-    /* From the centre every direction is as near. */
-    if (d > REAL(4.0) * EPSILON * chain->outer) {
-        ray[0] = ray[0] / d;
-        ray[1] = ray[1] / d;
-    } else {
-        ray[0] = away[0];
-        ray[1] = away[1];
+    ray_to(s, centre, chain->outer, away, ray);
+    if (chain->least > REAL(0.0)) {
+        consider_circle(s, centre, chain->inner, ray, 0);
     }
-    for (k = chain->least > REAL(0.0) ? 0 : 1; k < 2; k++) {
-        fivebar_real radius = k == 0 ? chain->inner : chain->outer;
-
-        c[0] = centre[0] + radius * ray[0];
-        c[1] = centre[1] + radius * ray[1];
-        consider(s, c);
-    }
+    consider_circle(s, centre, chain->outer, ray, 0);
 }
 
 /* Consider the two crossings of a circle about A with one about E. */
@@ -787,7 +828,7 @@ static void consider_corners(search *s, fivebar_real r_A, fivebar_real r_E)
     fivebar_real gap = r_A - r_E;
     fivebar_real h2 = ((sum - d) * (sum + d)) * ((d - gap) * (d + gap));
     fivebar_real a = REAL(0.5) * d + sum * gap / (REAL(2.0) * d);
-    fivebar_real h = square_root(h2 > REAL(0.0) ? h2 : REAL(0.0)) / (REAL(2.0) * d);
+    fivebar_real h = positive_root(h2) / (REAL(2.0) * d);
     fivebar_real c[2];
     int side;
 
@@ -799,24 +840,316 @@ static void consider_corners(search *s, fivebar_real r_A, fivebar_real r_E)
         u[1] = REAL(-2.0) * A[1] / d;
         c[0] = A[0] + (a * u[0] - across * u[1]);
         c[1] = A[1] + (a * u[1] + across * u[0]);
-        consider(s, c);
+        consider(s, c, 0);
+    }
+}
+
+/* Without an extension the boundary is made of arcs of the chains' circles, which end in corners, so
+ * the nearest point is the foot of a perpendicular on a circle, or a corner. */
+static void search_rings(search *s)
+{
+    const fivebar_leg *leg = s->leg;
+    fivebar_real E[2];
+    int k;
+
+    E[0] = -leg->A[0];
+    E[1] = -leg->A[1];
+    consider_circles(s, &leg->to_C, E, s->away_E);
+    for (k = 0; k < 4 && leg->L5 > REAL(0.0); k++) {
+        if (((k & 2) || leg->to_foot.least > REAL(0.0)) &&
+            ((k & 1) || leg->to_C.least > REAL(0.0))) {
+            consider_corners(s, k & 2 ? leg->to_foot.outer : leg->to_foot.inner,
+                             k & 1 ? leg->to_C.outer : leg->to_C.inner);
+        }
+    }
+}
+
+/* ---- Coupler curves ----------------------------------------------------------------------- */
+
+/* With C at the edge of E's reach, |EC| = R, a foot on an extension moves on a coupler curve of the
+ * four-bar A, B, C, E. All of the curve is in reach, so its nearest point may be taken wherever it
+ * is. A four-bar has its crank's pivot in the origin, the rocker's at (base, 0). */
+typedef struct {
+    fivebar_real crank;
+    fivebar_real coupler;
+    fivebar_real rocker;
+    fivebar_real base;
+    fivebar_real offset[2]; /* F from the crank's end, over the coupler; complex numbers */
+    fivebar_real point[2];  /* that the nearest one is wanted for, in this frame */
+    fivebar_real middle;    /* of the crank's range [rad] */
+    fivebar_real half;      /* of the range's width [rad] */
+    fivebar_real sign;      /* of the two curves: +1, -1 */
+    int swapped;            /* E has the crank, and the frame is turned by half a turn */
+    int turning;            /* the crank goes all around; a curve for each side of the rocker */
+    int single;             /* one range about 0 or pi; else two, mirror images */
+} four_bar;
+
+/* A place on a coupler curve. */
+typedef struct {
+    fivebar_real F[2];
+    fivebar_real along[2]; /* its velocity along the curve, to some scale */
+    fivebar_real r[2];     /* from the crank's end to the rocker's pivot */
+    fivebar_real slope;    /* of how near it is to the point: + while it comes nearer */
+} place;
+
+/* Intervals on a curve (or half of one that is single), parts of an interval that needs them, and
+ * steps to a minimum within one. */
+#define INTERVALS 32
+#define PARTS 8
+#define STEPS 12
+
+/* Tangent of what a direction may turn within an interval. */
+#define TURN REAL(0.5)
+
+/* Where the first interval begins: nowhere near the symmetric poses, where branches may cross. */
+#define BEGIN REAL(0.4375)
+
+/* How often the doubled unit in the last place may move a point back into reach. */
+#define NUDGES 6
+
+/* Return the crank's angle, 0 .. pi, at a distance from its end to the rocker's pivot. */
+static fivebar_real angle_at(const four_bar *bar, fivebar_real distance)
+{
+    fivebar_real near = magnitude(bar->crank - bar->base);
+    fivebar_real far = bar->crank + bar->base;
+    fivebar_real sine = positive_root((distance - near) * (distance + near));
+    fivebar_real cosine = positive_root((far - distance) * (far + distance));
+
+    return REAL(2.0) * direction(sine, cosine);
+}
+
+/* Set the crank's range; 0 if there is no pose. */
+static int set_range(four_bar *bar)
+{
+    fivebar_real near = magnitude(bar->crank - bar->base);
+    fivebar_real far = bar->crank + bar->base;
+    fivebar_real low = magnitude(bar->coupler - bar->rocker);
+    fivebar_real high = bar->coupler + bar->rocker;
+    fivebar_real least = angle_at(bar, low);
+    fivebar_real most = angle_at(bar, high);
+    int from_0 = low <= near;
+    int to_pi = high >= far;
+
+    bar->turning = from_0 && to_pi;
+    bar->single = from_0 != to_pi;
+    bar->middle = REAL(0.5) * (least + most);
+    bar->half = REAL(0.5) * (most - least);
+    if (bar->single) {
+        bar->middle = from_0 ? REAL(0.0) : PI;
+        bar->half = from_0 ? most : PI - least;
+    }
+    return high >= near && low <= far;
+}
+
+/* Set the four-bar of a radius of E's reach. The crank is the one whose end keeps farther from the
+ * other pivot: near that the coupler would turn with hardly any angle of the crank. */
+static int set_bar(four_bar *bar, const search *s, const fivebar_real u[2], fivebar_real R)
+{
+    const fivebar_leg *leg = s->leg;
+    fivebar_real one = magnitude(leg->L1 - leg->L5);
+    fivebar_real two = magnitude(leg->L2 - R);
+    fivebar_real of_A = one > two ? one : two;
+    fivebar_real three = magnitude(R - leg->L5);
+    fivebar_real four = magnitude(leg->L2 - leg->L1);
+    fivebar_real of_E = three > four ? three : four;
+    fivebar_real x = s->point[0] - leg->A[0];
+    fivebar_real z = s->point[1] - leg->A[1];
+
+    bar->swapped = !(of_A >= of_E);
+    bar->crank = bar->swapped ? R : leg->L1;
+    bar->coupler = leg->L2;
+    bar->rocker = bar->swapped ? leg->L1 : R;
+    bar->base = leg->L5;
+    bar->offset[0] = bar->swapped ? REAL(1.0) - leg->foot[0] : leg->foot[0];
+    bar->offset[1] = bar->swapped ? -leg->foot[1] : leg->foot[1];
+    bar->point[0] = u[0] * x + u[1] * z;
+    bar->point[1] = u[0] * z - u[1] * x;
+    if (bar->swapped) {
+        bar->point[0] = bar->base - bar->point[0];
+        bar->point[1] = -bar->point[1];
+    }
+    return set_range(bar);
+}
+
+/* Store the place at w, 0 .. 4 once around the curve: a turn of the crank, or there and back. */
+static void follow(const four_bar *bar, fivebar_real w, place *at)
+{
+    fivebar_real half = REAL(0.5);
+    fivebar_real wrapped = w >= REAL(4.0) ? w - REAL(4.0) : w;
+    int there = wrapped < REAL(2.0);
+    fivebar_real part = there ? wrapped - REAL(1.0) : REAL(3.0) - wrapped;
+    /* Flat at both ends, where the rocker's side changes. */
+    fivebar_real swing = bar->half * (half * part * (REAL(3.0) - part * part));
+    fivebar_real middle = bar->single ? bar->middle : bar->sign * bar->middle;
+    fivebar_real theta = bar->turning ? bar->sign * (half * PI * wrapped) : middle + swing;
+    fivebar_real side = bar->turning ? bar->sign : there ? REAL(1.0) : REAL(-1.0);
+    fivebar_real sum = bar->coupler + bar->rocker;
+    fivebar_real gap = bar->coupler - bar->rocker;
+    fivebar_real X[2];
+    fivebar_real V[2];
+    fivebar_real W[2];
+    fivebar_real S[2];
+    fivebar_real d2;
+    fivebar_real root;
+    fivebar_real ahead;
+    fivebar_real across;
+    fivebar_real by_crank;
+    fivebar_real by_coupler;
+
+    unit(theta, X);
+    X[0] = bar->crank * X[0];
+    X[1] = bar->crank * X[1];
+    at->r[0] = bar->base - X[0];
+    at->r[1] = -X[1];
+    d2 = at->r[0] * at->r[0] + at->r[1] * at->r[1];
+    root = side * positive_root((sum * sum - d2) * (d2 - gap * gap));
+    ahead = (d2 + sum * gap) / (REAL(2.0) * d2);
+    across = root / (REAL(2.0) * d2);
+    /* The coupler, what it carries to the foot, and the rocker from its pivot. */
+    V[0] = ahead * at->r[0] - across * at->r[1];
+    V[1] = ahead * at->r[1] + across * at->r[0];
+    multiply(bar->offset, V, W);
+    at->F[0] = X[0] + W[0];
+    at->F[1] = X[1] + W[1];
+    S[0] = V[0] - at->r[0];
+    S[1] = V[1] - at->r[1];
+    /* The rocker keeps its length where crank and coupler turn at these rates: never both 0 but at a
+     * crossing of branches. */
+    by_crank = half * root;
+    by_coupler = cross(X, S);
+    at->along[0] = W[1] * by_coupler - X[1] * by_crank;
+    at->along[1] = X[0] * by_crank - W[0] * by_coupler;
+    at->slope = (bar->point[0] - at->F[0]) * at->along[0] +
+                (bar->point[1] - at->F[1]) * at->along[1];
+}
+
+static void consider_place(search *s, const four_bar *bar, const fivebar_real u[2],
+                           const place *at)
+{
+    fivebar_real x = bar->swapped ? bar->base - at->F[0] : at->F[0];
+    fivebar_real z = bar->swapped ? -at->F[1] : at->F[1];
+    fivebar_real c[2];
+
+    c[0] = s->leg->A[0] + (u[0] * x - u[1] * z);
+    c[1] = s->leg->A[1] + (u[0] * z + u[1] * x);
+    consider(s, c, NUDGES);
+}
+
+/* Consider the minimum between two places, if there is one: the slope's zero, by the Illinois
+ * rule. */
+static void consider_interval(search *s, const four_bar *bar, const fivebar_real u[2],
+                              fivebar_real w, fivebar_real width, const place *start,
+                              const place *end)
+{
+    fivebar_real a = REAL(0.0);
+    fivebar_real b = REAL(1.0);
+    fivebar_real f_a = start->slope;
+    fivebar_real f_b = end->slope;
+    place at;
+    int k;
+
+    if (!(f_a > REAL(0.0)) || f_b > REAL(0.0)) {
+        return;
+    }
+    for (k = 0; k < STEPS; k++) {
+        fivebar_real fall = f_b - f_a;
+        fivebar_real next = b - f_b * (b - a) / (fall == REAL(0.0) ? REAL(1.0) : fall);
+
+        follow(bar, w + next * width, &at);
+        if ((at.slope > REAL(0.0)) != (f_b > REAL(0.0))) {
+            a = b;
+            f_a = f_b;
+        } else {
+            f_a = REAL(0.5) * f_a;
+        }
+        b = next;
+        f_b = at.slope;
+    }
+    consider_place(s, bar, u, &at);
+}
+
+static int veers(const fivebar_real a[2], const fivebar_real b[2])
+{
+    return !(magnitude(cross(a, b)) <= TURN * (a[0] * b[0] + a[1] * b[1]));
+}
+
+/* Consider the minima of one of a four-bar's two curves, or of one half of a single one. */
+static void search_curve(search *s, const four_bar *bar, const fivebar_real u[2])
+{
+    fivebar_real width = (bar->single ? REAL(2.0) : REAL(4.0)) / (fivebar_real)INTERVALS;
+    fivebar_real first = bar->single && bar->sign < REAL(0.0) ? REAL(2.0) : REAL(0.0);
+    fivebar_real w = first + BEGIN * width;
+    place start;
+    place end;
+    int j;
+
+    follow(bar, w, &start);
+    /* Of a leg with all links in line the curve is a point, on which nothing falls. */
+    consider_place(s, bar, u, &start);
+    for (j = 1; j <= INTERVALS; j++) {
+        fivebar_real next = first + ((fivebar_real)j + BEGIN) * width;
+
+        follow(bar, next, &end);
+        /* Where the foot or the crank's pose changes fast, a closer look. */
+        if (veers(start.along, end.along) || veers(start.r, end.r)) {
+            fivebar_real small = width / (fivebar_real)PARTS;
+            int m;
+
+            for (m = 0; m < PARTS; m++) {
+                place between;
+
+                follow(bar, w + (fivebar_real)(m + 1) * small, &between);
+                consider_interval(s, bar, u, w + (fivebar_real)m * small, small, &start, &between);
+                start = between;
+            }
+        } else {
+            consider_interval(s, bar, u, w, width, &start, &end);
+        }
+        start = end;
+        w = next;
+    }
+}
+
+/* With an extension the boundary is made of coupler curves, beside the circles about A. */
+static void search_curves(search *s)
+{
+    const fivebar_leg *leg = s->leg;
+    int coaxial = !(leg->L5 > REAL(0.0));
+    fivebar_real u[2];
+    fivebar_real ray[2];
+    four_bar bar;
+    int k;
+
+    u[0] = coaxial ? REAL(1.0) : -s->away_A[0];
+    u[1] = coaxial ? REAL(0.0) : -s->away_A[1];
+    ray_to(s, leg->A, leg->to_foot.outer, s->away_A, ray);
+    for (k = leg->to_C.least > REAL(0.0) ? 0 : 2; k < 4; k++) {
+        bar.sign = k & 1 ? REAL(-1.0) : REAL(1.0);
+        if (!set_bar(&bar, s, u, k & 2 ? leg->to_C.outer : leg->to_C.inner)) {
+            continue;
+        }
+        /* A, B and C are one rigid triangle about A: the curve is a circle. */
+        if (coaxial) {
+            place at;
+            fivebar_real radius;
+
+            follow(&bar, REAL(0.0), &at);
+            radius = square_root(at.F[0] * at.F[0] + at.F[1] * at.F[1]);
+            consider_circle(s, leg->A, radius, ray, NUDGES);
+        } else {
+            search_curve(s, &bar, u);
+        }
     }
 }
 
 /* Coordinates from here on have no nearest point [m]. */
 #define FARTHEST REAL(1e6)
 
-/* The boundary is made of arcs of the chains' circles, which end in corners, so the nearest point
- * is the foot of a perpendicular on a circle, or a corner. */
 int fivebar_nearest(const fivebar_leg *leg, const fivebar_real foot[2], fivebar_real nearest[2])
 {
     search s;
-    fivebar_real E[2];
-    fivebar_real away_A[2];
-    fivebar_real away_E[2];
     int coaxial = !(leg->L5 > REAL(0.0));
     int status = fivebar_reaches(leg, foot, 0);
-    int k;
 
     if (status == FIVEBAR_NOT_FINITE) {
         return status;
@@ -825,9 +1158,6 @@ int fivebar_nearest(const fivebar_leg *leg, const fivebar_real foot[2], fivebar_
         nearest[0] = foot[0];
         nearest[1] = foot[1];
         return FIVEBAR_OK;
-    }
-    if (leg->L6 > REAL(0.0)) {
-        return FIVEBAR_NO_ANSWER;
     }
     /* Squares must not overflow. */
     if (!(magnitude(foot[0]) <= FARTHEST && magnitude(foot[1]) <= FARTHEST)) {
@@ -839,21 +1169,16 @@ int fivebar_nearest(const fivebar_leg *leg, const fivebar_real foot[2], fivebar_
     s.best[0] = REAL(0.0);
     s.best[1] = REAL(0.0);
     s.found = 0;
-    E[0] = -leg->A[0];
-    E[1] = -leg->A[1];
     /* Of a point on a motor: away from the other one; down if they are coaxial. */
-    away_A[0] = coaxial ? REAL(0.0) : REAL(2.0) * leg->A[0] / leg->L5;
-    away_A[1] = coaxial ? REAL(-1.0) : REAL(2.0) * leg->A[1] / leg->L5;
-    away_E[0] = coaxial ? REAL(0.0) : -away_A[0];
-    away_E[1] = coaxial ? REAL(-1.0) : -away_A[1];
-    consider_circles(&s, &leg->to_foot, leg->A, away_A);
-    consider_circles(&s, &leg->to_C, E, away_E);
-    for (k = 0; k < 4 && !coaxial; k++) {
-        if (((k & 2) || leg->to_foot.least > REAL(0.0)) &&
-            ((k & 1) || leg->to_C.least > REAL(0.0))) {
-            consider_corners(&s, k & 2 ? leg->to_foot.outer : leg->to_foot.inner,
-                             k & 1 ? leg->to_C.outer : leg->to_C.inner);
-        }
+    s.away_A[0] = coaxial ? REAL(0.0) : REAL(2.0) * leg->A[0] / leg->L5;
+    s.away_A[1] = coaxial ? REAL(-1.0) : REAL(2.0) * leg->A[1] / leg->L5;
+    s.away_E[0] = coaxial ? REAL(0.0) : -s.away_A[0];
+    s.away_E[1] = coaxial ? REAL(-1.0) : -s.away_A[1];
+    consider_circles(&s, &leg->to_foot, leg->A, s.away_A);
+    if (leg->L6 > REAL(0.0)) {
+        search_curves(&s);
+    } else {
+        search_rings(&s);
     }
     if (!s.found) {
         return FIVEBAR_UNREACHABLE;
@@ -908,7 +1233,7 @@ int fivebar_hip_inverse(const fivebar_leg *leg, const fivebar_hip *hip, const fi
     if (!(u2 >= REAL(-8.0) * EPSILON * (w * w))) {
         return FIVEBAR_UNREACHABLE;
     }
-    u = (fivebar_real)hip->side * square_root(u2 > REAL(0.0) ? u2 : REAL(0.0));
+    u = (fivebar_real)hip->side * positive_root(u2);
     planar[0] = side_step ? foot[0] : u - hip->along;
     planar[1] = side_step ? u - hip->along : foot[2];
     status = fivebar_inverse(leg, planar, s_A, s_E, theta);

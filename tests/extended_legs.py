@@ -52,6 +52,16 @@ def narrow(rng: np.random.Generator) -> FiveBar:
     return leg_of(rng, np.array([a, c, d, b]), rng.uniform(0.09, 0.12), float(c) * 0.5)
 
 
+def multiples(rng: np.random.Generator) -> FiveBar:
+    """Return a leg whose links are small multiples of one length: what can be in line, is."""
+    while True:
+        L = rng.integers(1, 9, 6) / 64.0
+        L[4] *= rng.integers(0, 4) > 0
+        if 2.0 * L[:5].max() < L[:5].sum():
+            L1, L2, L3, L4, L5, L6 = L.tolist()
+            return FiveBar(L1, L2, L3, L4, L5, L6)
+
+
 def sliver(rng: np.random.Generator) -> FiveBar:
     """Return a leg that is stretched to within 1e-3 to 1e-5 of its size."""
     L = rng.uniform(0.03, 0.1, 4)

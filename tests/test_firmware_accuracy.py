@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from extended_legs import Draw, any_leg, coaxial, containing, multiples, narrow, no_hole
 
 from fivebar_sim import firmware, kinematics, workspace
 from fivebar_sim.arrays import Array
@@ -15,6 +16,7 @@ from fivebar_sim.geometry import FiveBar
 from fivebar_sim.kinematics.planar import cross
 from fivebar_sim.kinematics.reach import points_at
 
+LENGTHS = ("L1", "L2", "L3", "L4", "L5", "L6", "bend", "tilt")
 PRESETS = ("airhockey", "classic", "doggo", "extended", "minitaur", "q8bot")
 KINDS = (np.float32, np.float64)
 
@@ -26,6 +28,12 @@ INLINE = 0.02
 
 MIDST = 0.3
 """Sine of the angle at C of a pose that counts as away from the edge."""
+
+
+def as_float(leg: FiveBar) -> FiveBar:
+    """Return a leg whose lengths a float holds: the firmware's is the same one."""
+    L1, L2, L3, L4, L5, L6, bend, tilt = (float(np.float32(getattr(leg, k))) for k in LENGTHS)
+    return FiveBar(L1, L2, L3, L4, L5, L6, bend, tilt)
 
 
 def drawn_poses(leg: FiveBar, count: int, kind: Any) -> tuple[Array, Array, Array]:
@@ -133,19 +141,43 @@ def test_statuses_are_those_of_the_exact_kinematics(name: str) -> None:
     assert np.isnan(theta[status != firmware.Status.OK]).all()
 
 
-def test_nearest_points_are_those_of_the_workspace() -> None:
+def check_nearest(leg: FiveBar, foot: Array, kind: Any) -> float:
+    """Return how far distances to the nearest points are off, at most, over size and L5."""
+    made = firmware.of(leg, kind)
+    foot = foot.astype(kind).astype(float)
+    found, status = firmware.nearest(made, foot)
+    assert not status.any()
+    assert not firmware.reaches(made, found).any()
+    gap = np.hypot(*(found - foot).T)
+    least = np.hypot(*(workspace.nearest(leg, foot) - foot).T)
+    outside = firmware.reaches(made, foot) != firmware.Status.OK
+    assert outside.any()
+    return float(np.abs(gap - least)[outside].max() / (leg.size + leg.L5))
+
+
+@pytest.mark.parametrize("name", PRESETS)
+def test_nearest_points_are_those_of_the_workspace(name: str) -> None:
+    leg = FiveBar.load(name)
     rng = np.random.default_rng(11)
-    for name in PRESETS:
-        leg = FiveBar.load(name)
-        made = firmware.of(leg)
-        foot = rng.uniform(-2.0, 2.0, (500, 2)) * leg.size
-        found, status = firmware.nearest(made, foot)
-        if leg.L6 > 0.0:
-            outside = firmware.reaches(made, foot) != firmware.Status.OK
-            np.testing.assert_array_equal(status == firmware.Status.NO_ANSWER, outside)
-            continue
-        assert not status.any()
-        assert not firmware.reaches(made, found).any()
-        gap = np.hypot(*(found - foot).T)
-        least = np.hypot(*(workspace.nearest(leg, foot) - foot).T)
-        np.testing.assert_allclose(gap, least, rtol=0, atol=1e-6 * (leg.size + leg.L5))
+    foot = rng.uniform(-2.0, 2.0, (200, 2)) * leg.size
+    assert check_nearest(leg, foot, np.float32) < 1e-6
+    assert check_nearest(leg, foot, np.float64) < 1e-14
+
+
+# Of the last, links that are multiples of one length: branches cross, and all may be in line.
+@pytest.mark.parametrize("draw", [any_leg, coaxial, no_hole, containing, narrow, multiples])
+@pytest.mark.parametrize("count", [2, pytest.param(300, marks=pytest.mark.long)])
+def test_nearest_points_of_extended_legs(draw: Draw, count: int) -> None:
+    rng = np.random.default_rng(3)
+    for _ in range(count):
+        leg = as_float(draw(rng))
+        foot = rng.uniform(-1.5, 1.5, (12, 2)) * leg.size * rng.choice([0.3, 1.0], (12, 1))
+        assert check_nearest(leg, foot, np.float32) < 1e-6
+        assert check_nearest(leg, foot, np.float64) < 1e-14
+
+
+def test_branches_that_cross_hide_no_minimum() -> None:
+    """L1 = L2 and L3 + L4 = L5: near a crossing C moves sixteen times as fast as the crank."""
+    leg = FiveBar(0.125, 0.125, 0.0625, 0.046875, 0.109375, 0.0390625)
+    foot = np.array([[-0.10321482, 0.04628612], [-0.09179764, 0.11424068]])
+    assert check_nearest(leg, foot, np.float32) < 1e-6

@@ -21,7 +21,6 @@ class Status(IntEnum):
     SINGULAR = 5
     BAD_ARGUMENT = 6
     BAD_LEG = 7
-    NO_ANSWER = 8
 
 
 def first_of(*checks: tuple[ArrayLike, Status]) -> Statuses:

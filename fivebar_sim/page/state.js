@@ -60,7 +60,8 @@ export class State {
     const nearest = this.leg.nearest(target);
     if (nearest !== null && this.leg.reaches(nearest)) return nearest;
 
-    // Legs with an extension: from a point in reach as far towards the target as there is reach.
+    // With an extension that point may be another working mode's: from one in reach as far towards
+    // the target as there is reach.
     let inside = this.leg.reaches(this.foot) ? this.foot : this.#anywhere(target);
     let outside = target;
     for (let k = 0; k < HALVINGS; k++) {
