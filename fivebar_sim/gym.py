@@ -45,17 +45,30 @@ def layout(task: Task) -> dict[str, slice]:
     return found
 
 
-def plain_spec(spec: EnvSpec | None, task: Task) -> EnvSpec | None:
-    """Return the spec of an environment as JSON can hold it, with the length of its episodes.
+class Registered:
+    """What knows how Gymnasium makes it, with the length of its episodes, as JSON can hold it.
 
-    Options that are objects become tables, from which `gymnasium.make` makes the same ones.
+    A base of both environments, before Gymnasium's own: `gymnasium.make` sets their `spec`.
     """
-    if spec is None:
-        return None
-    kept = copy.copy(spec)
-    kept.kwargs = {name: options.plain(value) for name, value in spec.kwargs.items()}
-    kept.max_episode_steps = task.periods
-    return kept
+
+    task: Task
+    _spec: EnvSpec | None = None
+
+    @property
+    def spec(self) -> EnvSpec | None:
+        """How `gymnasium.make` or `make_vec` makes this environment; None unless one did.
+
+        Options that are objects become tables, from which it makes the same ones.
+        """
+        return self._spec
+
+    @spec.setter
+    def spec(self, value: EnvSpec | None) -> None:
+        kept = copy.copy(value)
+        if kept is not None:
+            kept.kwargs = {name: options.plain(each) for name, each in kept.kwargs.items()}
+            kept.max_episode_steps = self.task.periods
+        self._spec = kept
 
 
 def check_reset_options(given: Any, known: tuple[str, ...] = ()) -> dict[str, Any]:
@@ -113,7 +126,9 @@ def check_render_mode(render_mode: Any, known: tuple[str, ...]) -> None:
         raise ArgumentError(unknown("render_mode", str(render_mode), known))
 
 
-class LegEnv(gymnasium.Env[Array, Array]):
+class LegEnv(  # pyright: ignore[reportIncompatibleVariableOverride]
+    Registered, gymnasium.Env[Array, Array]
+):
     """One leg with one task.
 
     Observations are the task's `parts` one after the other (`layout` says where), actions its
@@ -161,7 +176,6 @@ class LegEnv(gymnasium.Env[Array, Array]):
         # Made by the first `render`: training without pictures needs no GL.
         self._picture: LegPicture | None = None
         self._data: mujoco.MjData | None = None
-        self._spec: EnvSpec | None = None
         self.task = self._group.task
         self.episodes = self._group.episodes
         self.observation_space, self.action_space = spaces(self.episodes)
@@ -171,17 +185,6 @@ class LegEnv(gymnasium.Env[Array, Array]):
     def __getstate__(self) -> dict[str, Any]:
         # GL contexts cannot be copied, and MjData is made from the state again.
         return {**self.__dict__, "_picture": None, "_data": None}
-
-    @property
-    def spec(self) -> EnvSpec | None:
-        """How `gymnasium.make` makes this environment; None unless it did."""
-        return self._spec
-
-    @spec.setter
-    def spec(  # pyright: ignore[reportIncompatibleVariableOverride]
-        self, value: EnvSpec | None
-    ) -> None:
-        self._spec = plain_spec(value, self.task)
 
     @property
     def model(self) -> mujoco.MjModel:

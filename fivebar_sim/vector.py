@@ -7,7 +7,6 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from gymnasium.envs.registration import EnvSpec
 from gymnasium.utils import seeding
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
@@ -19,10 +18,10 @@ from fivebar_sim.checks import is_finite
 from fivebar_sim.errors import ArgumentError, unknown
 from fivebar_sim.gym import (
     Pictures,
+    Registered,
     check_render_mode,
     check_reset_options,
     layout,
-    plain_spec,
     spaces,
 )
 from fivebar_sim.render.leg_picture import HEIGHT, WIDTH, Camera, LegPicture
@@ -36,7 +35,9 @@ RENDER_MODES = ("rgb_array", "rgb_array_list")
 MODES = {mode.value: mode for mode in AutoresetMode}
 
 
-class LegVectorEnv(VectorEnv[Array, Array, Any]):
+class LegVectorEnv(  # pyright: ignore[reportIncompatibleVariableOverride]
+    Registered, VectorEnv[Array, Array, Any]
+):
     """Many legs with one task, stepped together; leg i equals a `LegEnv` of its seeds bit for bit.
 
     That is LegEnv(task, randomise=randomise, model_seed=model_seed + i), reset with seed + i, or
@@ -104,7 +105,6 @@ class LegVectorEnv(VectorEnv[Array, Array, Any]):
         self._group = LegGroup(wanted, seeds, tasks.ranges(randomise), threads)
         self.render_mode = render_mode
         self._picture: LegPicture | None = None
-        self._spec: EnvSpec | None = None
         self.task = self._group.task
         self.episodes = self._group.episodes
         self.drawn = self._group.drawn
@@ -125,17 +125,6 @@ class LegVectorEnv(VectorEnv[Array, Array, Any]):
     def __getstate__(self) -> dict[str, Any]:
         # A GL context cannot be copied; the next `render` makes one.
         return {**self.__dict__, "_picture": None}
-
-    @property
-    def spec(self) -> EnvSpec | None:
-        """How `gymnasium.make_vec` makes this environment; None unless it did."""
-        return self._spec
-
-    @spec.setter
-    def spec(  # pyright: ignore[reportIncompatibleVariableOverride]
-        self, value: EnvSpec | None
-    ) -> None:
-        self._spec = plain_spec(value, self.task)
 
     def reset(
         self,
