@@ -12,7 +12,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -20,7 +20,6 @@ from fivebar_sim.arrays import Array
 from fivebar_sim.errors import FiveBarError
 from fivebar_sim.files import file_stream
 from fivebar_sim.metrics.columns import Record
-from fivebar_sim.metrics.measured import Judged
 from fivebar_sim.recording import foot, ground, layout
 from fivebar_sim.recording import leg as scene
 from fivebar_sim.recording.check import PROPERTY
@@ -37,12 +36,12 @@ from fivebar_sim.recording.poses import (
 )
 from fivebar_sim.recording.summary import summary
 from fivebar_sim.scenario.leg_words import leg_words
+from fivebar_sim.scenario.run import Run
 from fivebar_sim.simulation.provenance import identity
 
 if TYPE_CHECKING:
     import rerun as rr
 
-    from fivebar_sim.scenario import Scenario
 
 APPLICATION = "fivebar"
 CHUNK = 65_536
@@ -54,25 +53,6 @@ _sessions = 0
 
 class RerunDisabledError(FiveBarError, RuntimeError):
     """Rerun is switched off by the environment."""
-
-
-class Run(Protocol):
-    """The parts of a run that are drawn: of a result, or of one that was read back."""
-
-    @property
-    def scenario(self) -> Scenario:
-        """The scenario that was run."""
-        ...
-
-    @property
-    def record(self) -> Record:
-        """The columns of rollout.parquet, each (N,), SI."""
-        ...
-
-    @property
-    def measured(self) -> Judged:
-        """All of metrics.json, with types."""
-        ...
 
 
 def write(path: Path, runs: Sequence[Run], labels: Sequence[str] = ()) -> None:

@@ -8,7 +8,7 @@ saw all runs that were off: they only say why, where one of them shows.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -16,12 +16,12 @@ from fivebar_sim.control import Feedback
 from fivebar_sim.errors import FiveBarError
 from fivebar_sim.metrics import guards, tracking
 from fivebar_sim.metrics.catalogue import ABSOLUTE, SHOWN, shown
-from fivebar_sim.metrics.columns import MOTORS, Record, motors
-from fivebar_sim.metrics.limits import Limit, look_up
-from fivebar_sim.metrics.measured import Judged
+from fivebar_sim.metrics.columns import MOTORS, motors
+from fivebar_sim.metrics.limits import look_up
 from fivebar_sim.runs.extrapolation import converge
 from fivebar_sim.scenario import Scenario
 from fivebar_sim.scenario.refined import refined, shortened
+from fivebar_sim.scenario.run import JudgedRun
 from fivebar_sim.scenario.scenes import Ground
 
 BAR = 0.05
@@ -73,36 +73,7 @@ FIRST = 10
 """Steps in which a run starts: what is held, and perhaps moves, sets in at once."""
 
 
-class Run(Protocol):
-    """A run and what came of it: `rollout.Result`."""
-
-    @property
-    def scenario(self) -> Scenario:
-        """What was run."""
-        ...
-
-    @property
-    def record(self) -> Record:
-        """The columns of rollout.parquet."""
-        ...
-
-    @property
-    def measured(self) -> Judged:
-        """All of metrics.json, with types."""
-        ...
-
-    @property
-    def metrics(self) -> dict[str, Any]:
-        """The same as nested dictionaries."""
-        ...
-
-    @property
-    def limits(self) -> list[Limit]:
-        """Every limit with its value."""
-        ...
-
-
-def warnings(result: Run, again: Callable[[Scenario], Run]) -> list[str]:
+def warnings(result: JudgedRun, again: Callable[[Scenario], JudgedRun]) -> list[str]:
     """Return what a run's numbers owe to its timestep, for people; often nothing.
 
     Args:
@@ -208,7 +179,7 @@ def _named(off: Sequence[Difference], verb: str) -> Iterator[str]:
         yield f"{SHOWN[key][0]} {verb} {shown(key, now)}, not {shown(key, was)} ({by} % off)"
 
 
-def _flipped(first: Run, finer: Run) -> Iterator[str]:
+def _flipped(first: JudgedRun, finer: JudgedRun) -> Iterator[str]:
     """Yield the limits that hold in a run, but not in shorter steps; see `differences`."""
     allowed = first.scenario.converge
     for was, now in zip(first.limits, finer.limits, strict=True):
@@ -223,13 +194,13 @@ def _flipped(first: Run, finer: Run) -> Iterator[str]:
             )
 
 
-def _reasons(result: Run) -> Iterator[str]:
+def _reasons(result: JudgedRun) -> Iterator[str]:
     """Yield what in a run may make its numbers depend on the timestep."""
     found = (_jolted(result), _started(result), _opened(result), _sprung(result))
     yield from (each for each in found if each is not None)
 
 
-def _jolted(result: Run) -> str | None:
+def _jolted(result: JudgedRun) -> str | None:
     """Return that torques last a single step."""
     jolts = next((each.value for each in result.measured.guards if each.name == "jolts"), None)
     if jolts is None or not jolts > JOLTED:
@@ -237,7 +208,7 @@ def _jolted(result: Run) -> str | None:
     return f"{100.0 * jolts:.3g} % of the largest torque lasted one step"
 
 
-def _started(result: Run) -> str | None:
+def _started(result: JudgedRun) -> str | None:
     """Return that the largest torque is that of the start."""
     # A feedback controller holds each torque for a period: it has no step of its own.
     if isinstance(result.scenario.controller, Feedback):
@@ -249,7 +220,7 @@ def _started(result: Run) -> str | None:
     return f"the largest torque of {motor} is that of the first {FIRST} steps, when the run starts"
 
 
-def _opened(result: Run) -> str | None:
+def _opened(result: JudgedRun) -> str | None:
     """Return that tracking is no better than the loop's gap."""
     scenario = result.scenario
     gap = tracking.gap_rms(scenario.leg, result.record, scenario.window)
@@ -259,7 +230,7 @@ def _opened(result: Run) -> str | None:
     return f"the loop is open by {1e3 * gap:.3g} mm, of an error of {1e3 * error:.3g} mm"
 
 
-def _sprung(result: Run) -> str | None:
+def _sprung(result: JudgedRun) -> str | None:
     """Return that the step damps the servos' springs, which jerks and contacts load.
 
     Under `discrete` a spring acts with the angle that a step ends in: as if kd were kp h larger.

@@ -19,9 +19,9 @@ from fivebar_sim.arrays import Array
 from fivebar_sim.errors import RunDirectoryError
 from fivebar_sim.files import exchange, leftovers, quantities, whole_file
 from fivebar_sim.metrics.columns import digest
-from fivebar_sim.recording import rrd
 from fivebar_sim.runs import checksums, described, recorded
 from fivebar_sim.runs.kept import DIVERGED, FILES, keep, own_names
+from fivebar_sim.scenario.run import Run
 
 RECORDING = "recording.rrd"
 
@@ -38,7 +38,7 @@ OVERTAKEN = {errno.ENOENT, errno.ENOTEMPTY, errno.EEXIST}
 """Errors of a rename when another process renamed something there in between."""
 
 
-def write(result: rrd.Run, path: Path) -> Path:
+def write(result: Run, path: Path) -> Path:
     """Write a run directory beside its place, then rename it, so that it is never incomplete.
 
     An existing run directory, or an empty one, is replaced; anything else there is refused. What a
@@ -173,7 +173,7 @@ def as_toml(scenario: Any) -> str:
     return quantities.annotated(tomli_w.dumps(scenario.table()), kinds, {"duration": "s"})
 
 
-def _fill(stage: Path, result: rrd.Run) -> None:
+def _fill(stage: Path, result: Run) -> None:
     """Write the files of a run into an empty directory."""
     scenario = result.scenario
     (stage / "scenario.toml").write_text(as_toml(scenario), encoding="utf-8")

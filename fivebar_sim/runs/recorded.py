@@ -8,10 +8,11 @@ from pathlib import Path
 from fivebar_sim.errors import ConfigError
 from fivebar_sim.recording import rrd
 from fivebar_sim.robots.scenario import RobotScenario
+from fivebar_sim.scenario.run import Run
 from fivebar_sim.walking import recording as robots
 
 
-def write(path: Path, runs: Sequence[rrd.Run], labels: Sequence[str] = ()) -> None:
+def write(path: Path, runs: Sequence[Run], labels: Sequence[str] = ()) -> None:
     """Write the recording of one or more runs; see `rrd.write`.
 
     Raises:
@@ -25,7 +26,7 @@ def write(path: Path, runs: Sequence[rrd.Run], labels: Sequence[str] = ()) -> No
         rrd.write(path, runs, labels)
 
 
-def all_of_robots(runs: Sequence[rrd.Run]) -> bool:
+def all_of_robots(runs: Sequence[Run]) -> bool:
     """Return whether runs are of robots, not of legs.
 
     Raises:

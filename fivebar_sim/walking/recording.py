@@ -27,6 +27,7 @@ from fivebar_sim.robots import LEGS, Robot, places
 from fivebar_sim.robots.columns import of_leg, trunk
 from fivebar_sim.robots.measure import Trunk, heading, lean
 from fivebar_sim.robots.scenario import RobotScenario
+from fivebar_sim.scenario.run import Run
 from fivebar_sim.simulation.provenance import identity
 
 if TYPE_CHECKING:
@@ -43,14 +44,14 @@ TURNED = (0.0, 0.0, 1.0, 0.0)
 """Half a turn about z, as a quaternion (x, y, z, w)."""
 
 
-def write(path: Path, runs: Sequence[rrd.Run], labels: Sequence[str] = ()) -> None:
+def write(path: Path, runs: Sequence[Run], labels: Sequence[str] = ()) -> None:
     """Write the recording of one or more robots' runs to a .rrd file; see `rrd.write`."""
     names = list(labels) or [run.scenario.name for run in runs]
     with rrd.file_of(path, names) as stream:
         _send(stream, runs, names)
 
 
-def _send(stream: rr.RecordingStream, runs: Sequence[rrd.Run], names: list[str]) -> None:
+def _send(stream: rr.RecordingStream, runs: Sequence[Run], names: list[str]) -> None:
     """Send the layout, the text, the floor and all runs."""
     import rerun as rr
 
@@ -74,12 +75,12 @@ def _send(stream: rr.RecordingStream, runs: Sequence[rrd.Run], names: list[str])
                 rrd.send_series(stream, part, look, rrd.times(time[steps - 1], steps))
 
 
-def _robot(run: rrd.Run) -> Robot:
+def _robot(run: Run) -> Robot:
     assert isinstance(run.scenario, RobotScenario)
     return run.scenario.robot
 
 
-def _send_run(stream: rr.RecordingStream, run: rrd.Run, look: Look, room: Room) -> None:
+def _send_run(stream: rr.RecordingStream, run: Run, look: Look, room: Room) -> None:
     """Send one run: the robot's numbers and its motion, and the floor's forces."""
     import rerun as rr
 
@@ -113,7 +114,7 @@ def _send_run(stream: rr.RecordingStream, run: rrd.Run, look: Look, room: Room) 
 
 def _send_leg(
     stream: rr.RecordingStream,
-    run: rrd.Run,
+    run: Run,
     name: str,
     look: Look,
     drawn: list[rr.TimeColumn],
@@ -150,7 +151,7 @@ def _in_air(record: Record) -> Record:
 
 def _send_force(
     stream: rr.RecordingStream,
-    run: rrd.Run,
+    run: Run,
     name: str,
     look: Look,
     drawn: list[rr.TimeColumn],
@@ -213,7 +214,7 @@ def _of_legs(path: str, title: str, columns: dict[str, Array], scale: float) -> 
     return Series(path, title, dict(COLOURS), values, np.ones(len(values), dtype=bool))
 
 
-def _room(runs: Sequence[rrd.Run]) -> Room:
+def _room(runs: Sequence[Run]) -> Room:
     """Return the room that all runs need."""
     bodies = [trunk(run.record) for run in runs]
     seen = [body.position[:, [0, 2]] for body in bodies if body is not None]
