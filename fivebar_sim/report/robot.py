@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 from fivebar_sim import units
-from fivebar_sim.metrics import guards
 from fivebar_sim.metrics.catalogue import shown
 from fivebar_sim.metrics.limits import has, look_up
 from fivebar_sim.report import html, single
 from fivebar_sim.report.draw import Drawn
-from fivebar_sim.report.html import text
 from fivebar_sim.report.robot_figures import figures, robot_of
 from fivebar_sim.robots import LEGS
 from fivebar_sim.runs.stored import StoredRun
@@ -49,7 +47,7 @@ def page(run: StoredRun, drawn: list[Drawn]) -> str:
 
 
 def _head(run: StoredRun) -> str:
-    """Return the heading: name, verdict, and a sentence about the run."""
+    """Return the heading of a robot's run."""
     scenario = run.scenario
     window = scenario.window
     h = scenario.sim.timestep
@@ -62,16 +60,7 @@ def _head(run: StoredRun) -> str:
         f"{window.start * h:.4g} s to {window.stop * h:.4g} s, what is called (run) over the whole "
         f"run; a number without a leg's name is that of all legs together."
     )
-
-    tripped = [f'<p class="fail">{text(said)}</p>' for said in guards.tripped(run.measured.guards)]
-    return "\n".join(
-        [
-            f"<header>\n<h1>{text(scenario.name)}</h1>",
-            f"<p>{html.judgement(run.measured.verdict)}</p>",
-            *tripped,
-            f"<p>{text(about)}</p>\n</header>",
-        ]
-    )
+    return single.head(run, about)
 
 
 def _legs(run: StoredRun) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shlex
+from collections.abc import Sequence
 from typing import Any
 
 import msgspec
@@ -63,7 +64,7 @@ def page(run: StoredRun, drawn: list[Drawn]) -> str:
 
 
 def _head(run: StoredRun) -> str:
-    """Return the heading: name, verdict, and a sentence about the run."""
+    """Return the heading of a leg's run."""
     scenario = run.scenario
     window = scenario.window
     h = scenario.sim.timestep
@@ -76,16 +77,25 @@ def _head(run: StoredRun) -> str:
         f"{window.start * h:.4g} s to {window.stop * h:.4g} s, what is called (run) over the whole "
         f"run."
     )
-    tripped = [f'<p class="fail">{text(said)}</p>' for said in guards.tripped(run.measured.guards)]
     remark = tracking.astray(scenario.leg, run.record, window)
-    warnings = [] if remark is None else [f"<p>{text(f'Warning: {remark}.')}</p>"]
+    return head(run, about, [] if remark is None else [remark])
 
+
+def head(run: StoredRun, about: str, warnings: Sequence[str] = ()) -> str:
+    """Return the heading of a run's page.
+
+    Args:
+        run: The run.
+        about: What was run, in a few sentences.
+        warnings: What its reader must know.
+    """
+    tripped = [f'<p class="fail">{text(said)}</p>' for said in guards.tripped(run.measured.guards)]
     return "\n".join(
         [
-            f"<header>\n<h1>{text(scenario.name)}</h1>",
+            f"<header>\n<h1>{text(run.scenario.name)}</h1>",
             f"<p>{html.judgement(run.measured.verdict)}</p>",
             *tripped,
-            *warnings,
+            *(f"<p>{text(f'Warning: {said}.')}</p>" for said in warnings),
             f"<p>{text(about)}</p>\n</header>",
         ]
     )
