@@ -14,11 +14,16 @@ from fivebar_controllers.pd import Pd
 from matplotlib.figure import Figure
 
 from fivebar_sim import FiveBar, Result, Scenario, rollout, run
-from fivebar_sim.errors import ArgumentError, RunDirectoryError
+from fivebar_sim.control.servo import Servo
+from fivebar_sim.errors import ArgumentError, ConfigError, RunDirectoryError
 from fivebar_sim.files import resources
-from fivebar_sim.paths import Ellipse
+from fivebar_sim.paths import Ellipse, Gait, Hop
 from fivebar_sim.report import look, notebook
 from fivebar_sim.report.draw import Drawn
+from fivebar_sim.scenario.forces import Constant
+from fivebar_sim.scenario.scenes import Treadmill
+
+ELLIPSE = Ellipse(centre=(0.0, -0.072), radii=(0.02, 0.008), frequency=2.0, ramp=0.25)
 
 
 @pytest.fixture(scope="module")
@@ -36,13 +41,52 @@ def test_repr_of_a_leg_makes_the_leg(preset: str) -> None:
 
 
 def test_leg_and_path_make_a_scenario() -> None:
-    path = Ellipse(centre=(0.0, -0.072), radii=(0.02, 0.008), frequency=2.0, ramp=0.25)
+    path = ELLIPSE
     shipped = Scenario.load("classic-ellipse", ["limits={}"])
     plain = Scenario(leg=FiveBar(name="classic"), path=path)
     assert msgspec.structs.replace(plain, name=shipped.name) == shipped
     assert Scenario(leg=FiveBar(), path=path, controller=Pd()).controller_name == "pd"
     table = plain.table()
     assert Scenario.from_table(table, "again", Path()) == plain
+
+
+GAIT = Gait(centre=(0.0, -0.075), stride=0.04, lift=0.012, frequency=1.5, ramp=0.25)
+HOP = Hop(low=0.055, high=0.085, frequency=2.0, thrust=0.15, flight=0.25)
+
+UNFIT: list[tuple[dict[str, Any], str]] = [
+    ({"leg": "classic"}, r"Scenario: leg must be a FiveBar, got 'classic'"),
+    ({"path": None}, r"Scenario: path must be a FootPath, got None"),
+    ({"servo": "xl330"}, r"Scenario: servo must be a Servo, got 'xl330'"),
+    ({"name": "a/b"}, r"Scenario: name must be a plain file name"),
+    ({"duration": -1.0}, r"Scenario: duration must be in \(0, inf\) s, got -1.0"),
+    ({"duration": 0.5}, r"duration must be longer than the ramp of 0.25 s and one period"),
+    ({"servo": Servo(rate=1500.0)}, r"servo\.rate must be"),
+    ({"force": Constant(value=(0.0, 1.0))}, r"\[force\] has no effect in scene 'air'"),
+    ({"limits": {"tracking.rmss": 1e-3}}, r"unknown key 'tracking.rmss'.*did you mean"),
+    ({"limits": {"tracking.rms": (2.0, 1.0)}}, r"limits.tracking.rms must be an upper bound or"),
+    ({"limits": {"ground.slip": 1.0}}, r"limits.ground.slip needs a ground"),
+    ({"limits": {"load.heat.A": 1.0}}, r"limits.load.heat.A needs servo.kt"),
+    ({"path": HOP}, r"needs a ground"),
+    ({"scene": Treadmill(mass=0.5), "path": ELLIPSE}, r"scene.speed is missing"),
+]
+
+
+@pytest.mark.parametrize(("changed", "message"), UNFIT)
+def test_what_does_not_fit_is_refused_in_python_too(changed: dict[str, Any], message: str) -> None:
+    """As in a file; and where a part of a legal scenario is replaced."""
+    legal = Scenario(leg=FiveBar(), path=GAIT)
+    with pytest.raises(ConfigError, match=message):
+        Scenario(**{"leg": FiveBar(), "path": GAIT, **changed})
+    with pytest.raises(ConfigError, match=message):
+        msgspec.structs.replace(legal, **changed)
+
+
+def test_belt_and_limits_are_filled_in_as_in_a_file() -> None:
+    limits: Any = {"tracking.rms": 1e-3, "load.share_A": (0.4, 0.6)}
+    built = Scenario(leg=FiveBar(), path=GAIT, scene=Treadmill(mass=0.5), limits=limits)
+    assert isinstance(built.scene, Treadmill)
+    assert built.scene.speed == GAIT.stance_speed
+    assert built.limits == {"tracking.rms": (-np.inf, 1e-3), "load.share_A": (0.4, 0.6)}
 
 
 def test_html_has_verdict_metrics_and_leg(result: Result, monkeypatch: pytest.MonkeyPatch) -> None:

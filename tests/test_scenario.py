@@ -19,8 +19,9 @@ from fivebar_sim.files import resources
 from fivebar_sim.geometry import FiveBar
 from fivebar_sim.paths import Circle, Csv, Ellipse
 from fivebar_sim.scenario import Scenario
-from fivebar_sim.scenario.scenario import MOST_STEPS, Sim, copied_name
+from fivebar_sim.scenario.scenario import Sim, copied_name
 from fivebar_sim.scenario.scenes import Air
+from fivebar_sim.scenario.together import MOST_STEPS
 
 ELLIPSE = """
 duration = 0.6

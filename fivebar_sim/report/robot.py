@@ -60,6 +60,7 @@ def _head(run: StoredRun) -> str:
         f"{window.start * h:.4g} s to {window.stop * h:.4g} s, what is called (run) over the whole "
         f"run; a number without a leg's name is that of all legs together."
     )
+
     return single.head(run, about)
 
 

@@ -77,6 +77,7 @@ def _head(run: StoredRun) -> str:
         f"{window.start * h:.4g} s to {window.stop * h:.4g} s, what is called (run) over the whole "
         f"run."
     )
+
     remark = tracking.astray(scenario.leg, run.record, window)
     return head(run, about, [] if remark is None else [remark])
 

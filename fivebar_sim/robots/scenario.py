@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import msgspec
 
@@ -20,7 +20,7 @@ from fivebar_sim.robots.floor import Scene as Stage
 from fivebar_sim.robots.gait import PHASES, Gait
 from fivebar_sim.robots.robot import LEGS, Robot
 from fivebar_sim.scenario import Scenario, reading
-from fivebar_sim.scenario.scenario import check_window
+from fivebar_sim.scenario.together import check_window
 
 KEYS = (
     *("name", "robot", "scene", "duration", "path", "gait", "controller"),
@@ -48,6 +48,11 @@ class RobotScenario(Scenario, frozen=True, kw_only=True):
     phases: dict[str, float]
     strides: dict[str, float] | None = None
     scene: Stage = Floor()
+    known_limits: ClassVar[tuple[str, ...]] = ROBOT_KEYS
+
+    def _fit(self) -> None:
+        """Raise unless all parts fit together."""
+        _check_together(self)
 
     @property
     def words(self) -> str:
@@ -76,27 +81,25 @@ class RobotScenario(Scenario, frozen=True, kw_only=True):
         phases, strides = _gait(gait, where)
         scene = _scene(table.get("scene", "floor"), where)
 
-        scenario = cls(
-            name=name,
-            robot=robot,
-            leg=robot.leg,
-            servo=robot.servo,
-            path=path,
-            phases=phases,
-            strides=strides,
-            controller=controller,
-            controller_name=controller_name,
-            scene=scene,
-            duration=duration,
-            sensors=tables.convert(table.get("sensors", {}), Sensors, "sensors", where),
-            sim=reading.sim(table.get("sim", {}), scene, where),
-            guards=tables.convert(table.get("guards", {}), Guards, "guards", where),
-            limits=tables.bounds(table.get("limits", {}), ROBOT_KEYS, "limits", where),
-            converge=reading.converge(table.get("converge", {}), where, ROBOT_KEYS),
-        )
-        # Last: it compares the tables with each other, each of which is legal by now.
-        _check_together(scenario, where)
-        return scenario
+        parts = {
+            "name": name,
+            "robot": robot,
+            "leg": robot.leg,
+            "servo": robot.servo,
+            "path": path,
+            "phases": phases,
+            "strides": strides,
+            "controller": controller,
+            "controller_name": controller_name,
+            "scene": scene,
+            "duration": duration,
+            "sensors": tables.convert(table.get("sensors", {}), Sensors, "sensors", where),
+            "sim": reading.sim(table.get("sim", {}), scene, where),
+            "guards": tables.convert(table.get("guards", {}), Guards, "guards", where),
+            "limits": tables.bounds(table.get("limits", {}), ROBOT_KEYS, "limits", where),
+            "converge": reading.converge(table.get("converge", {}), where, ROBOT_KEYS),
+        }
+        return cls._of_parts(parts, where)
 
     def table(self) -> Table:
         """Return the resolved scenario as a TOML table: the robot spelt out, every default written.
@@ -185,26 +188,26 @@ def _scene(value: Any, where: str) -> Stage:
     return tables.convert(own, KINDS[kind], "scene", where)
 
 
-def _check_together(scenario: RobotScenario, where: str) -> None:
+def _check_together(scenario: RobotScenario) -> None:
     """Raise unless the tables of a scenario, each legal by itself, fit together."""
     try:
         scenario.gait  # noqa: B018 made for its checks
     except ArgumentError as error:
-        raise ConfigError(f"{where}: gait.{error}") from None
+        raise ConfigError(f"gait.{error}") from None
 
-    check_window(scenario, where)
+    check_window(scenario)
     if scenario.servo.records_friction:
         raise ConfigError(
-            f"{where}: servo.friction of a robot must be a number [N m]: friction that changes "
+            "servo.friction of a robot must be a number [N m]: friction that changes "
             "with speed and load is known of single legs only"
         )
     held = isinstance(scenario.scene, Air)
     for key in scenario.limits:
         if held and key in (*TRUNK_KEYS, *GROUND_KEYS):
-            raise ConfigError(f"{where}: limits.{key} needs a floor: scene must be 'floor'")
+            raise ConfigError(f"limits.{key} needs a floor: scene must be 'floor'")
         if key in JUMP_KEYS and scenario.path.period is not None:
             raise ConfigError(
-                f"{where}: limits.{key} needs a path that does not repeat, as kind 'heights': a "
+                f"limits.{key} needs a path that does not repeat, as kind 'heights': a "
                 "gait is no jump"
             )
-    reading.check_servo_limits(scenario.limits, scenario.servo, where)
+    reading.check_servo_limits(scenario.limits, scenario.servo)

@@ -133,7 +133,7 @@ def servo(value: Any, where: str, folder: Path) -> Servo:
     return servo_of({**base, **own}, where)
 
 
-def check_servo_limits(limits: Iterable[str], servo: Servo, where: str) -> None:
+def check_servo_limits(limits: Iterable[str], servo: Servo) -> None:
     """Raise if a limit is on a metric that needs more of the servo than its table says.
 
     Raises:
@@ -147,7 +147,7 @@ def check_servo_limits(limits: Iterable[str], servo: Servo, where: str) -> None:
     for keys, given, what in needs:
         for key in limits:
             if key in keys and given is None:
-                raise ConfigError(f"{where}: limits.{key} needs {what}: this servo has none")
+                raise ConfigError(f"limits.{key} needs {what}: this servo has none")
 
 
 def sim(value: Any, scene: Scene, where: str) -> Sim:

@@ -8,7 +8,8 @@ import msgspec
 
 from fivebar_sim.errors import ConfigError
 from fivebar_sim.integrator import Integrator
-from fivebar_sim.scenario.scenario import MOST_STEPS, Scenario
+from fivebar_sim.scenario.scenario import Scenario
+from fivebar_sim.scenario.together import MOST_STEPS
 
 
 def refined(scenario: Scenario, parts: int, integrator: Integrator) -> Scenario:

@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterable
 from dataclasses import asdict
 from pathlib import Path
+from typing import Any, ClassVar, Self
 
 import msgspec
 import numpy as np
@@ -16,21 +17,18 @@ from fivebar_sim.arrays import Array
 from fivebar_sim.control import Feedback, Setpoints, find, name_of
 from fivebar_sim.control.sensors import Sensors
 from fivebar_sim.control.servo import Servo
-from fivebar_sim.errors import ArgumentError, ConfigError, unknown
+from fivebar_sim.errors import ConfigError, unknown
 from fivebar_sim.files import resources, tables
 from fivebar_sim.files.tables import Table
 from fivebar_sim.geometry import FiveBar
 from fivebar_sim.integrator import Sim
-from fivebar_sim.metrics.catalogue import GROUND_KEYS, LIMIT_KEYS
+from fivebar_sim.metrics.catalogue import LIMIT_KEYS
 from fivebar_sim.metrics.guards import Guards
-from fivebar_sim.paths import FootPath, Gait
-from fivebar_sim.scenario import forces, reading
+from fivebar_sim.paths import FootPath
+from fivebar_sim.scenario import forces, reading, together
 from fivebar_sim.scenario.forces import FootForce
 from fivebar_sim.scenario.leg_words import leg_words
-from fivebar_sim.scenario.scenes import Air, Ground, Payload, Scene, Treadmill
-
-MOST_STEPS = 5_000_000
-"""Physics steps of one run: what its arrays need, about 600 bytes a step, must fit in memory."""
+from fivebar_sim.scenario.scenes import Air, Ground, Payload, Scene
 
 KEYS = (
     *("name", "leg", "scene", "duration", "path", "force", "servo", "sensors", "controller"),
@@ -75,9 +73,22 @@ class Scenario(msgspec.Struct, frozen=True, kw_only=True):
     limits: dict[str, tuple[float, float]] = {}
     converge: dict[str, float] = {}
 
+    known_limits: ClassVar[tuple[str, ...]] = LIMIT_KEYS
+
     def __post_init__(self) -> None:
+        together.check_parts(self)
         if not self.controller_name:
             msgspec.structs.force_setattr(self, "controller_name", name_of(self.controller))
+        limits = together.legal_limits(self.limits, self.known_limits)
+        msgspec.structs.force_setattr(self, "limits", limits)
+        self._fit()
+
+    def _fit(self) -> None:
+        """Fill in what follows from other parts; raise unless all of them fit together."""
+        scene = together.with_belt_speed(self.scene, self.path)
+        msgspec.structs.force_setattr(self, "scene", scene)
+        together.check_window(self)
+        together.check_scene(self)
 
     @property
     def words(self) -> str:
@@ -189,27 +200,36 @@ class Scenario(msgspec.Struct, frozen=True, kw_only=True):
         path = reading.path(table.get("path"), where, folder)
         scene = reading.scene(table.get("scene", "air"), where)
         servo = reading.servo(table.get("servo", {}), where, folder)
-        scenario = cls(
-            name=name,
-            leg=reading.leg(table.get("leg", "classic"), where, folder, servo.armature),
-            path=path,
-            controller=controller,
-            controller_name=controller_name,
-            scene=_with_belt_speed(scene, path, where),
-            duration=duration,
-            force=reading.force(table.get("force"), where, folder),
-            servo=servo,
-            sensors=tables.convert(table.get("sensors", {}), Sensors, "sensors", where),
-            sim=reading.sim(table.get("sim", {}), scene, where),
-            guards=tables.convert(table.get("guards", {}), Guards, "guards", where),
-            limits=tables.bounds(table.get("limits", {}), LIMIT_KEYS, "limits", where),
-            converge=reading.converge(table.get("converge", {}), where),
-        )
-        # Last: these compare the tables with each other, each of which is legal by now.
-        check_window(scenario, where)
-        _check_scene(scenario, where)
+        parts = {
+            "name": name,
+            "leg": reading.leg(table.get("leg", "classic"), where, folder, servo.armature),
+            "path": path,
+            "controller": controller,
+            "controller_name": controller_name,
+            "scene": scene,
+            "duration": duration,
+            "force": reading.force(table.get("force"), where, folder),
+            "servo": servo,
+            "sensors": tables.convert(table.get("sensors", {}), Sensors, "sensors", where),
+            "sim": reading.sim(table.get("sim", {}), scene, where),
+            "guards": tables.convert(table.get("guards", {}), Guards, "guards", where),
+            "limits": tables.bounds(table.get("limits", {}), LIMIT_KEYS, "limits", where),
+            "converge": reading.converge(table.get("converge", {}), where),
+        }
 
-        return scenario
+        return cls._of_parts(parts, where)
+
+    @classmethod
+    def _of_parts(cls, parts: dict[str, Any], where: str) -> Self:
+        """Return the scenario of legal parts.
+
+        Raises:
+            ConfigError: They do not fit together; the message begins with `where`.
+        """
+        try:
+            return cls(**parts)
+        except ConfigError as error:
+            raise ConfigError(f"{where}: {error}") from None
 
     def driven_by(self, controller: Setpoints | Feedback) -> Scenario:
         """Return the same scenario with another controller, under that controller's name.
@@ -301,86 +321,3 @@ def copied_name(part: FootPath | FootForce | None) -> str | None:
 def _present(table: Table) -> Table:
     """Return the keys that have a value: TOML has no null."""
     return {key: value for key, value in table.items() if value is not None}
-
-
-def check_window(scenario: Scenario, where: str) -> None:
-    """Raise unless the run is long enough to measure, and path and force last as long as it."""
-    h = scenario.sim.timestep
-    path = scenario.path
-    duration = scenario.duration
-    came = f"got {duration:g} s"
-    if not 2 <= duration / h <= MOST_STEPS:
-        raise ConfigError(
-            f"{where}: duration must be 2 to {MOST_STEPS} timesteps of {h:g} s, {came}"
-        )
-    # 1e-9: the product of steps and timestep is rounded.
-    if not scenario.steps * h <= path.end * (1.0 + 1e-9):
-        raise ConfigError(f"{where}: duration must be at most the path's {path.end:g} s, {came}")
-
-    if (force := scenario.force) and not scenario.steps * h <= force.end * (1.0 + 1e-9):
-        raise ConfigError(f"{where}: duration must be at most the force's {force.end:g} s, {came}")
-
-    # Asked only for their checks: no bus is faster than the timestep, or rounded to another one.
-    try:
-        scenario.servo.check_rate(h)
-        scenario.servo.check_whole(h)
-    except ArgumentError as error:
-        raise ConfigError(f"{where}: servo.{error}") from None
-
-    needs = path.ramp
-    what = f"the ramp of {path.ramp:g} s"
-    if path.period is not None:
-        needs = needs + path.period
-        what = f"{what} and one period of {path.period:g} s"
-
-    if not needs <= duration * (1.0 + 1e-9) or scenario.window.stop <= scenario.window.start:
-        raise ConfigError(
-            f"{where}: duration must be longer than {what}, to have something to measure; {came}"
-        )
-
-
-def _with_belt_speed(scene: Scene, path: FootPath, where: str) -> Scene:
-    """Return the scene; a belt without a speed gets the path's stance speed.
-
-    Raises:
-        ConfigError: The path has no stance.
-    """
-    if not isinstance(scene, Treadmill) or scene.speed is not None:
-        return scene
-    if not isinstance(path, Gait):
-        raise ConfigError(
-            f"{where}: scene.speed is missing: only a gait path says by itself how fast the belt "
-            f"must run"
-        )
-    try:
-        # May be refused: a legal gait can be faster than a belt may run.
-        return msgspec.structs.replace(scene, speed=path.stance_speed)
-    except ArgumentError as error:
-        raise ConfigError(f"{where}: scene.{error} from the path's stance") from None
-
-
-def _check_scene(scenario: Scenario, where: str) -> None:
-    """Raise unless the scene has what path, force and limits need."""
-    scene = scenario.scene
-    grounded = isinstance(scenario.scene, Ground)
-    if scenario.path.needs_ground and not grounded:
-        raise ConfigError(
-            f"{where}: path.kind {scenario.path.__struct_config__.tag!r} needs a ground: "
-            f"scene must be rail or treadmill, got {scene.kind!r}"
-        )
-    if isinstance(scene, Air) and scenario.force is not None:
-        raise ConfigError(f"{where}: [force] has no effect in scene 'air': choose another scene")
-    # A payload of nothing is the scene 'air' under another name.
-    if isinstance(scene, Payload) and scene.mass == 0.0 and scenario.force is None:
-        raise ConfigError(
-            f"{where}: scene.mass must be in (0, inf) kg where there is no [force], got 0.0"
-        )
-
-    for key in scenario.limits:
-        if key in GROUND_KEYS and not grounded:
-            raise ConfigError(
-                f"{where}: limits.{key} needs a ground: scene must be rail or treadmill, "
-                f"got {scene.kind!r}"
-            )
-
-    reading.check_servo_limits(scenario.limits, scenario.servo, where)
