@@ -32,7 +32,17 @@ KINDS: list[type[Any]] = [
     *(control.find(name) for name in control.known()),
 ]
 PURE = {
-    *("arithmetic", "assembly", "derivative", "duty", "feedforward", "file", "flight", "friction"),
+    *(
+        "arithmetic",
+        "assembly",
+        "columns",
+        "derivative",
+        "duty",
+        "feedforward",
+        "file",
+        "flight",
+        "friction",
+    ),
     *("integrator", "mass_error", "mode", "name", "outside", "periodic", "running", "scale"),
     *("seed", "thrust"),
 }

@@ -109,12 +109,16 @@ def _mistakes() -> Iterator[tuple[str, Callable[[Array], Array]]]:
     yield "degrees read as radians, a factor of 57.3: unit = 'deg'", lambda q: np.radians(q)
     yield "radians read as degrees, a factor of 57.3: unit = 'rad'", lambda q: np.degrees(q)
     yield "angles that count clockwise: sign = -1 for both", lambda q: -q
+
     for name, k in (("A", 0), ("E", 1)):
         flip = np.where(np.arange(2) == k, -1.0, 1.0)
         yield f"an angle that counts clockwise: sign = -1 for theta_{name}", lambda q, f=flip: f * q
+
     yield "angles from the other end: offset = '180 deg' for both", lambda q: q + turn
     yield "angles from straight down: offset = '-90 deg' for both", lambda q: q - 0.5 * turn
     yield "swapped and clockwise: exchange A and E, sign = -1 for both", lambda q: -q[:, ::-1]
+
+    # As on the other side of a robot.
     yield (
         "A and E swapped and seen from behind: exchange them, sign = -1, offset = '180 deg'",
         lambda q: turn - q[:, ::-1],

@@ -100,6 +100,7 @@ def _one_by_one(text: Any, cells: Cells) -> Array:
     found = np.empty(len(text))
     for k, cell in enumerate(text.to_pylist()):
         try:
+            # Python reads 1_000 as a number.
             found[k] = np.nan if cell is None else float(cell.replace("_", "x"))
         except ValueError:
             came = cells.values[k].as_py()
@@ -107,6 +108,7 @@ def _one_by_one(text: Any, cells: Cells) -> Array:
                 f"{cells.where}: column {cells.name!r}, row {cells.first + k}: must be a number, "
                 f"got {came!r:.40}: {_cure(came)}"
             ) from None
+
     found[np.isinf(found)] = np.nan
     return found
 

@@ -92,12 +92,16 @@ def _time_unit(raw: Raw, name: str, content: Content) -> str:
     named = _named_unit(raw, name, "s")
     if named:
         return named
+
     for word, unit in (("micros", "us"), ("millis", "ms"), ("nanosec", "ns")):
         if word in name.lower():
             return unit
+
     for unit, size in UNIX.items():
         if size <= content.first < 10.0 * size:
             return unit
+
+    # A microcontroller counts whole milliseconds, or microseconds.
     step = (content.high - content.low) / max(content.there - 1, 1)
     if content.whole and step >= 0.5:
         return "ms" if step < 200.0 else "us"

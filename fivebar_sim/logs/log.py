@@ -52,6 +52,21 @@ class Log(NamedTuple):
         there = np.isfinite(values)
         return self.time[there], values[there]
 
+    def complete(self, *names: str) -> tuple[Array, Array]:
+        """Return the times [s] of the rows in which all of some channels are there, and these.
+
+        Raises:
+            ConfigError: Fewer than two such rows.
+        """
+        values = np.stack([self.channels[name] for name in names], axis=-1)
+        there = np.isfinite(values).all(axis=-1)
+        if there.sum() < 2:
+            raise ConfigError(
+                f"{self.where}: at least 2 rows must have all of {', '.join(names)}, got "
+                f"{int(there.sum())}"
+            )
+        return self.time[there], values[there]
+
     def pair(self, name: str) -> Array:
         """Return a channel of A and of E side by side, "theta" or "ctrl", (n, 2)."""
         return np.stack([self.channels[f"{name}_{motor}"] for motor in "AE"], axis=-1)
@@ -86,7 +101,11 @@ def load(file: Path, known: Channels = channels.LEG) -> Log:
 
 
 def read(
-    source: Source, told: ColumnMap, known: Channels = channels.LEG, need: Iterable[str] = ()
+    source: Source,
+    told: ColumnMap,
+    known: Channels = channels.LEG,
+    need: Iterable[str] = (),
+    where: str = "",
 ) -> Log:
     """Return a log in SI units.
 
@@ -95,6 +114,7 @@ def read(
         told: Which column is what: `column_map.read_map(table, where)` of a table [log].
         known: The channels that there may be.
         need: Channels that must be there.
+        where: The file's name, for messages; "" for its path.
 
     Raises:
         ConfigError: The file cannot be read, a column is not there, a cell is no number, or the
@@ -103,8 +123,7 @@ def read(
     for name in need:
         if name not in told.channels:
             raise ConfigError(f"{told.where}: {name} is missing; channels: {', '.join(known)}")
-    name = str(source) if isinstance(source, Path) else str(told.file or told.where)
-    return _read(open_file(source, name), told)
+    return _read(open_file(source, where), told)
 
 
 def _read(raw: Raw, told: ColumnMap) -> Log:

@@ -57,12 +57,14 @@ def unique(names: Sequence[str], remarks: list[str]) -> tuple[str, ...]:
     """Return names of which each is there once: the second "pos" becomes "pos (2)"."""
     found: list[str] = []
     for k, given in enumerate(names):
+        # A table's index has no name, nor has what stands behind a last separator.
         name = given or ("index" if k == 0 else f"column {k + 1}")
         again = name
         count = 1
         while again in found:
             count += 1
             again = f"{name} ({count})"
+
         if count > 1:
             remarks.append(f"the name {name!r} is there twice: column {k + 1} is {again!r} here")
         found.append(again)

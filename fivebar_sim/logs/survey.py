@@ -95,9 +95,11 @@ def _content(cells: Cells, kind: str) -> Content:
         kind = "text" if kind == "text" else _other_kind(cells)
         there = len(cells.values) - cells.values.null_count
         return Content(kind, there, math.nan, math.nan, math.nan, False)
+
     there = values[np.isfinite(values)]
     if not len(there):
         return Content("nothing", 0, math.nan, math.nan, math.nan, True)
+
     whole = bool((there == np.round(there)).all())
     low = float(there.min())
     return Content("numbers", len(there), float(there[0]), low, float(there.max()), whole)
@@ -146,6 +148,7 @@ def timing(raw: Raw, column: str, scale: float) -> Timing | None:
         time = one.seconds(
             Cells(block.cells[column], column, block.first, raw.decimal, raw.where), scale
         )
+
         step = _steps(time, last)
         good = step[step > 0.0]
         if math.isnan(interval) and len(good):
@@ -153,10 +156,13 @@ def timing(raw: Raw, column: str, scale: float) -> Timing | None:
         if len(step):
             last = float(time[np.isfinite(time)][-1])
             end = max(end, float(np.nanmax(time)))
+
         jumped = clock.is_jump(step, interval)
         gap = (step > clock.GAP * interval) & ~jumped
         counts += [int(gap.sum()), int(jumped.sum()), int((step == 0.0).sum())]
         longest = max(longest, float(step[gap].max(initial=0.0)))
+
+    # A time that never grows has no interval.
     if math.isnan(interval):
         return None
     gaps, jumps, repeated = counts.tolist()

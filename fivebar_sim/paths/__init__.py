@@ -9,6 +9,7 @@ from typing import get_args
 
 from fivebar_sim.errors import ConfigError
 from fivebar_sim.files.installed import installed, load
+from fivebar_sim.paths.angles import Angles
 from fivebar_sim.paths.base import FootPath, Sample
 from fivebar_sim.paths.csv import Csv
 from fivebar_sim.paths.gait import Gait
@@ -21,6 +22,7 @@ from fivebar_sim.paths.step import Step
 
 __all__ = [
     "KINDS",
+    "Angles",
     "Circle",
     "Csv",
     "Ellipse",
@@ -41,7 +43,20 @@ __all__ = [
 GROUP = "fivebar_sim.paths"
 """The entry points by which other packages bring kinds of paths."""
 
-PathSpec = Circle | Csv | Ellipse | FigureEight | Gait | Heights | Hop | Line | Lines | Sine | Step
+PathSpec = (
+    Angles
+    | Circle
+    | Csv
+    | Ellipse
+    | FigureEight
+    | Gait
+    | Heights
+    | Hop
+    | Line
+    | Lines
+    | Sine
+    | Step
+)
 KINDS: dict[str, type[FootPath]] = {
     str(kind.__struct_config__.tag): kind for kind in get_args(PathSpec)
 }

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 from fivebar_sim.arrays import Array, at, first_index
 from fivebar_sim.checks import check_number
 from fivebar_sim.errors import ArgumentError
+from fivebar_sim.geometry import FiveBar
 
 TIME_ROUNDING = 1e-9
 """Times may pass the end of a path by this fraction of it: the rounding of a long sum of steps."""
@@ -161,6 +162,11 @@ class FootPath(
             ConfigError: A file that cannot be read or holds an illegal value.
         """
         del folder  # only the kinds that read a file need it
+        return self
+
+    def of_leg(self, leg: FiveBar) -> Self:
+        """Return the path for a leg; only motor angles give each leg another foot path."""
+        del leg
         return self
 
     def _times(self, time: ArrayLike) -> Array:

@@ -14,6 +14,7 @@ import msgspec
 import numpy as np
 from numpy.typing import ArrayLike
 
+from fivebar_sim import paths
 from fivebar_sim.arrays import Array
 from fivebar_sim.errors import ArgumentError
 from fivebar_sim.paths import FootPath, Gait
@@ -184,3 +185,6 @@ ForceSpec = Constant | Csv | Stance
 KINDS: dict[str, type[FootForce]] = {
     str(kind.__struct_config__.tag): kind for kind in get_args(ForceSpec)
 }
+
+READ = (paths.Csv, paths.Angles, Csv)
+"""Kinds of paths and forces that read a file, which goes with a resolved scenario."""

@@ -12,7 +12,6 @@ import msgspec
 import numpy as np
 import tomli_w
 
-from fivebar_sim import paths
 from fivebar_sim.arrays import Array
 from fivebar_sim.control import Feedback, Setpoints, find, name_of
 from fivebar_sim.control.sensors import Sensors
@@ -77,6 +76,8 @@ class Scenario(msgspec.Struct, frozen=True, kw_only=True):
 
     def __post_init__(self) -> None:
         together.check_parts(self)
+        # Also where another leg replaces the one that the path was of.
+        msgspec.structs.force_setattr(self, "path", self.path.of_leg(self.leg))
         if not self.controller_name:
             msgspec.structs.force_setattr(self, "controller_name", name_of(self.controller))
         limits = together.legal_limits(self.limits, self.known_limits)
@@ -303,8 +304,9 @@ class Scenario(msgspec.Struct, frozen=True, kw_only=True):
     def files(self) -> dict[str, bytes]:
         """The CSVs that go with a resolved scenario, by name, as they were when they were read."""
         parts = zip((self.path, self.force), self.copies, strict=True)
-        csvs = (paths.Csv, forces.Csv)
-        return {name: part.content for part, name in parts if name and isinstance(part, csvs)}
+        return {
+            name: part.content for part, name in parts if name and isinstance(part, forces.READ)
+        }
 
 
 def copied_name(part: FootPath | FootForce | None) -> str | None:
@@ -312,7 +314,7 @@ def copied_name(part: FootPath | FootForce | None) -> str | None:
 
     It ends with .csv, unlike the name of any other file there.
     """
-    if not isinstance(part, (paths.Csv, forces.Csv)):
+    if not isinstance(part, forces.READ):
         return None
     name = Path(part.file).name
     return name if name.endswith(".csv") else f"{name}.csv"
