@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from tyro.conf import arg
 
@@ -23,6 +23,7 @@ def run(
     *,
     out: Annotated[str | None, arg(metavar="DIR")] = None,
     settings: Settings = (),
+    log: Annotated[Literal["csv", "mcap"] | None, arg(metavar="{csv,mcap}")] = None,
     live: bool = False,
     live_at: Annotated[str | None, arg(metavar="HOST:PORT")] = None,
     quiet: bool = False,
@@ -42,6 +43,7 @@ def run(
             put beside them stays.
         settings: Change one key of every scenario, e.g. leg.L2=0.07 or "path.radii=[0.02, 0.01]";
             may be repeated. A new path.kind keeps the keys that both kinds have.
+        log: Write RUN_DIR/log.csv or .mcap too: what the sensors and the bus would have logged.
         live: Show the runs in a new Rerun viewer while they are simulated.
         live_at: Show them in a viewer that already listens on this machine.
         quiet: Print nothing but errors.
@@ -54,11 +56,24 @@ def run(
     # A place that cannot be written must not cost a simulation first.
     for place in places:
         directory.check_place(place)
+    if log is not None:
+        _check_legs(orders, log)
     shown = live or live_at is not None
     if shown:
         _check_live(orders)
     viewer = _viewer(live_at) if shown else None
-    return _run(orders, places, viewer, quiet=quiet, as_json=json)
+    return _run(orders, places, viewer, log, quiet=quiet, as_json=json)
+
+
+def _check_legs(orders: list[Order], kind: str) -> None:
+    """Raise if a run has no log, or none of a kind."""
+    from fivebar_sim.logs import mcap_file
+    from fivebar_sim.overlay import measured
+
+    for order in orders:
+        measured.check_leg(order.scenario)
+    if kind == "mcap":
+        mcap_file.needed()
 
 
 def _check_live(orders: list[Order]) -> None:
@@ -106,7 +121,13 @@ def _execute(order: Order, viewer: str | None, place: Path) -> Result:
 
 
 def _run(
-    orders: list[Order], places: list[Path], viewer: str | None, *, quiet: bool, as_json: bool
+    orders: list[Order],
+    places: list[Path],
+    viewer: str | None,
+    log: str | None,
+    *,
+    quiet: bool,
+    as_json: bool,
 ) -> int:
     """Run the scenarios one after another; return the highest exit status."""
     import json
@@ -122,6 +143,8 @@ def _run(
         try:
             with spinner(f"simulating {name}", quiet=quiet):
                 result = _execute(order, viewer, place)
+                if log is not None:
+                    _write_log(result, place / f"log.{log}")
                 # They take further runs: while the spinner turns, and once all is written.
                 remarks = [] if out is None else result.remarks
         # The other scenarios still run.
@@ -167,6 +190,14 @@ def _write(result: Result, place: Path) -> None:
         from fivebar_sim import report
 
         report.write([place], place / REPORT)
+
+
+def _write_log(result: Result, place: Path) -> None:
+    """Write what the sensors would have logged of a run."""
+    from fivebar_sim.logs import write
+    from fivebar_sim.overlay import measured
+
+    write.write(measured.log_of(result.scenario, result.record), place)
 
 
 def _places(orders: list[Order], out: str | None) -> list[Path]:
