@@ -33,6 +33,7 @@ COMMANDS = {
     "view": "Open MuJoCo's viewer: a scenario's run, or a leg moved by sliders.",
     "workspace": "Draw what a leg's foot can reach, and how deep inside it is.",
     "log": "Show what is in a log: columns, rate, gaps, ranges, and guesses what is what.",
+    "compare": "Lay a real leg's log over the simulated leg, which is sent the log's commands.",
     "certify": "Check any program that computes a leg against known answers.",
     "export": "Write a leg as MJCF, URDF or a C library, or a gait as a table.",
     "page": "Write a leg to play with on one HTML page, in any browser.",

@@ -39,6 +39,13 @@ class Angles(FootPath, frozen=True, tag="angles", dict=True):
     file: str
     columns: dict[str, Any] | None = None
 
+    @classmethod
+    def of_log(cls, log: logs.Log) -> Self:
+        """Return the path of a log that was read, without a ramp."""
+        path = cls(file=log.where, ramp=0.0)
+        vars(path)["log"] = log
+        return path
+
     def __post_init__(self) -> None:
         super().__post_init__()
         # No system takes a null byte in a name: Python raises a bare ValueError for one.
