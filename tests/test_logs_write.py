@@ -11,8 +11,8 @@ import pytest
 
 from fivebar_sim import Scenario, run
 from fivebar_sim.errors import ConfigError
-from fivebar_sim.logs import Log, load, write
-from fivebar_sim.overlay import measured
+from fivebar_sim.logs import Log, load
+from fivebar_sim.overlay import measured, write
 from fivebar_sim.rollout import Result
 
 SENSORS = ("sensors.noise=0.001", "sensors.rate_noise=0.01", "sensors.resolution=0.0015339808")

@@ -12,8 +12,8 @@ import pytest
 from fivebar_sim import Scenario, run
 from fivebar_sim.cli import main
 from fivebar_sim.errors import ConfigError, LoopOpenError
-from fivebar_sim.logs import Log, write
-from fivebar_sim.overlay import align, measured, page
+from fivebar_sim.logs import Log
+from fivebar_sim.overlay import align, measured, page, write
 from fivebar_sim.overlay.compare import KEYS, Channel, compare
 from fivebar_sim.overlay.play import played
 from fivebar_sim.rollout import Result

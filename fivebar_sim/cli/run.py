@@ -194,8 +194,7 @@ def _write(result: Result, place: Path) -> None:
 
 def _write_log(result: Result, place: Path) -> None:
     """Write what the sensors would have logged of a run."""
-    from fivebar_sim.logs import write
-    from fivebar_sim.overlay import measured
+    from fivebar_sim.overlay import measured, write
 
     write.write(measured.log_of(result.scenario, result.record), place)
 
