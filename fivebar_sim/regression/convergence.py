@@ -10,7 +10,7 @@ from fivebar_sim.errors import ConfigError, DivergedError
 from fivebar_sim.integrator import Integrator
 from fivebar_sim.metrics import guards
 from fivebar_sim.metrics.catalogue import ABSOLUTE
-from fivebar_sim.metrics.limits import look_up
+from fivebar_sim.metrics.limits import has, look_up
 from fivebar_sim.runs.coarse import NUMERICAL
 from fivebar_sim.runs.extrapolation import Convergence, converge, holds
 from fivebar_sim.scenario import Scenario
@@ -58,7 +58,7 @@ def study(planned: Sequence[rollout.AnyPlan]) -> Study:
     """
     results = [_executed(each) for each in planned]
     tables = [result.metrics for result in results]
-    keys = [key for key in ABSOLUTE if key.split(".")[0] in tables[0] and key not in NUMERICAL]
+    keys = [key for key in ABSOLUTE if has(tables[0], key) and key not in NUMERICAL]
     return Study(
         integrator=planned[0].scenario.sim.integrator,
         timesteps=[each.scenario.sim.timestep for each in planned],
