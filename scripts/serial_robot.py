@@ -171,11 +171,12 @@ def main() -> None:
     """Print the table."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n")[0])
     parser.add_argument("scenarios", nargs="*", default=SHOWN)
+    parser.add_argument("--set", dest="settings", nargs="*", default=[], help="KEY=VALUE")
     asked = parser.parse_args()
 
     print("| scenario | legs | torque peak, RMS [mN m] | heat [W] | motor [rad/s] | m/s | falls |")
     for name in asked.scenarios:
-        scenario = Scenario.load(name)
+        scenario = Scenario.load(name, asked.settings)
         assert isinstance(scenario, RobotScenario)
         for legs, found in zip(("five-bar", "serial"), both(scenario), strict=True):
             print(

@@ -70,7 +70,9 @@ def test_energy_balances_over_ten_seconds_of_trot() -> None:
 
 def test_torque_that_did_not_act_opens_the_balance() -> None:
     """A hundredth more of one motor's torque of eight shows."""
-    planned = plan_scenario(stand("path.stop=[0.01, -0.045]", "duration=0.3", "path.seconds=0.3"))
+    planned = plan_scenario(
+        stand("path.points=[[0, -0.043], [0.01, -0.045]]", "duration=0.3", "path.seconds=0.3")
+    )
     went = walk(planned)
     closed = energy.balance(went).imbalance
     went.record["RL_torque_E"] *= 1.01

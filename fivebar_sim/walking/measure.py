@@ -165,7 +165,8 @@ def _ground(went: Walk, legs: list[Leg]) -> GroundMetrics:
         force_max=GroundForce(x=_sideways(went, slice(None)), z=float(forces.max())),
         stance_share=float(down[:, window].mean()),
         slip=float(sum(each[window].sum() for each in slips)),
-        foot_height_max=float(max(each.max() for each in heights)),
+        # A run begins with the lowest foot just on the floor, before its first row.
+        foot_height_max=max(0.0, *(float(each.max()) for each in heights)),
         # The robot flies while none of its feet stands.
         flight_max=went.plan.sim.timestep * longest(np.logical_not(np.any(down, axis=0))),
     )
