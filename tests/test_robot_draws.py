@@ -38,6 +38,8 @@ def test_draws_are_within_their_ranges_and_the_same_again() -> None:
     # The legs keep their mass: what is more or less is the trunk's.
     assert {each.leg for each in drawn} == {TROT.leg}
     assert draw(TROT, 5, 1) == drawn[:5]
+    (uphill,) = draw(loaded("robot-q8bot-trot-fast", "scene.slope=0.1"), 1, 1)
+    assert uphill.scene == Floor(friction=frictions[0], slope=0.1)
     assert draw(TROT, 5, 2) != drawn[:5]
 
 

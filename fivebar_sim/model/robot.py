@@ -82,6 +82,8 @@ def robot_spec(
         spec = mujoco.MjSpec.from_file(str(file))
 
         set_options(spec, robot.leg, timestep, integrator)
+        if isinstance(scene, Floor):
+            spec.option.gravity = _downhill(spec.option.gravity, scene.slope)
         _weigh(spec, robot)
         for name in LEGS:
             leg = leg_spec(
@@ -114,6 +116,23 @@ def standing_height(robot: Robot, q: Array) -> float:
         for name, pose in zip(LEGS, poses, strict=True)
     ]
     return max(heights)
+
+
+def _downhill(gravity: Array, slope: float) -> Array:
+    """Return gravity along the axes of a floor that rises towards +x [m/s^2], (3,).
+
+    (g_x cos a + g_z sin a,   g_y,   g_z cos a - g_x sin a)
+
+    Args:
+        gravity: The same of a level floor.
+        slope: a [rad]; with 0 gravity stays what it is, to the last bit.
+    """
+    if slope == 0.0:
+        return gravity
+    x, y, z = gravity
+    cosine = np.cos(slope)
+    sine = np.sin(slope)
+    return np.array([x * cosine + z * sine, y, z * cosine - x * sine])
 
 
 def _weigh(spec: mujoco.MjSpec, robot: Robot) -> None:

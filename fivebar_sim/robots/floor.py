@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
+import math
+
 from fivebar_sim.checks import check_number
 from fivebar_sim.scenario import scenes
+
+STEEPEST = math.pi / 4.0
+"""Of a slope, up and down [rad]."""
 
 
 class Air(scenes.Scene, frozen=True, tag="air"):
@@ -11,16 +16,22 @@ class Air(scenes.Scene, frozen=True, tag="air"):
 
 
 class Floor(scenes.Scene, frozen=True, tag="floor"):
-    """The trunk free above a flat, level floor, which the feet meet.
+    """The trunk free above a flat floor, which the feet meet.
+
+    The world's axes are those of the floor: on a slope it is gravity that leans. What a controller
+    feeds forward for the legs' own weight knows of no slope.
 
     Attributes:
         friction: Coulomb's coefficient between feet and floor.
+        slope: Angle by which the floor rises towards +x [rad], where the robot faces at the start.
     """
 
     friction: float = 1.0
+    slope: float = 0.0
 
     def __post_init__(self) -> None:
         check_number("friction", self.friction, "", low=0.0, high=100.0)
+        check_number("slope", self.slope, "rad", low=-STEEPEST, high=STEEPEST)
 
 
 Scene = Air | Floor

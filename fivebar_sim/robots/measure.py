@@ -44,7 +44,7 @@ class Gone(msgspec.Struct, frozen=True):
         body_lengths_per_second: The same, in lengths of the trunk.
         drift: Mean speed to the left of its heading [m/s].
         turn_rate: Mean rate about the vertical, to the left [rad/s].
-        lean: Largest angle between the trunk's z axis and the vertical [rad].
+        lean: Largest angle between the trunk's z axis and the floor's [rad].
         bob: Range of the height of its origin [m].
         falls: How many times it fell.
     """

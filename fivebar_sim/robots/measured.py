@@ -23,7 +23,7 @@ class RobotTable(Table, frozen=True):
         body_lengths_per_second: The same, in lengths of the trunk.
         drift: To the left of its heading [m/s].
         turn_rate: About the vertical, to the left [rad/s].
-        lean: Largest angle between the trunk's z axis and the vertical [rad].
+        lean: Largest angle between the trunk's z axis and the floor's [rad].
         bob: Range of the height of its origin [m].
         falls: How many times it fell in the whole run.
         cost_of_transport: Work that the motors gave, for the weight and the way along the heading;

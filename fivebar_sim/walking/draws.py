@@ -71,9 +71,9 @@ def _with(scenario: RobotScenario, friction: float, mass: float, delay: float) -
     """Return a scenario with another friction, mass and delay."""
     servo = msgspec.structs.replace(scenario.servo, delay=max(scenario.servo.delay + delay, 0.0))
     robot = msgspec.structs.replace(scenario.robot, mass=mass * scenario.robot.mass, servo=servo)
-    return msgspec.structs.replace(
-        scenario, robot=robot, servo=servo, scene=Floor(friction=friction)
-    )
+    floor = scenario.scene if isinstance(scenario.scene, Floor) else Floor()
+    scene = msgspec.structs.replace(floor, friction=friction)
+    return msgspec.structs.replace(scenario, robot=robot, servo=servo, scene=scene)
 
 
 def outcomes(scenarios: Sequence[RobotScenario], nthread: int = 1) -> list[Outcome]:
