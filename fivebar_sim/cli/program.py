@@ -8,6 +8,7 @@ from __future__ import annotations
 import functools
 import importlib
 import io
+import keyword
 import os
 import shutil
 import sys
@@ -36,12 +37,13 @@ COMMANDS = {
     "compare": "Lay a real leg's log over the simulated leg, which is sent the log's commands.",
     "certify": "Check any program that computes a leg against known answers.",
     "export": "Write a leg as MJCF, URDF or a C library, or a gait as a table.",
+    "import": "Understand the five-bar leg of an MJCF or URDF, as a preset.",
     "page": "Write a leg to play with on one HTML page, in any browser.",
 }
 """The commands, each with the first line of its help.
 
 A command is a function in the module of its name in `fivebar_sim.cli`; its docstring begins with
-the same line.
+the same line. What is a word of Python's has an underscore behind it there.
 """
 
 HELP = {"-h", "--help"}
@@ -212,9 +214,15 @@ def _print_completion(shells: list[str]) -> int:
     return 0
 
 
+def function_of(name: str) -> Callable[..., int]:
+    """Return the function of a command."""
+    word = f"{name}_" if keyword.iskeyword(name) else name
+    return getattr(importlib.import_module(f"fivebar_sim.cli.{word}"), word)
+
+
 def _command(name: str) -> Callable[..., int]:
     """Return the function of a command, wrapped so that it prints plain text."""
-    function = getattr(importlib.import_module(f"fivebar_sim.cli.{name}"), name)
+    function = function_of(name)
 
     @functools.wraps(function)
     def command(*args: Any, **options: Any) -> int:

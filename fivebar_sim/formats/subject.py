@@ -88,6 +88,7 @@ def _kind(source: str, robot: bool) -> str:
         "scenario": resources.shipped("scenarios"),
     }
     kinds = [kind for kind, names in known.items() if source in names]
+
     if robot:
         kinds = ["robot"] if "robot" in kinds or source.endswith(".toml") else []
     elif source.endswith(".toml"):
@@ -111,6 +112,7 @@ def _of(scenario: Scenario) -> Subject:
     controller = scenario.controller
     drive = controller.drive if isinstance(controller, Feedback) else "position"
     robots = isinstance(scenario, RobotScenario)
+
     return Subject(
         name=scenario.name,
         words=f"scenario {scenario.name}",

@@ -166,6 +166,7 @@ def closures(compiled: mujoco.MjModel) -> str:
     motors = [compiled.joint(compiled.actuator_trnid[k, 0]).name for k in range(compiled.nu)]
     hinges = np.flatnonzero(compiled.jnt_type == mujoco.mjtJoint.mjJNT_HINGE)
     dofs = {name: compiled.joint(name).dofadr[0] for name in motors}
+
     armature = {name: float(compiled.dof_armature[dof]) for name, dof in dofs.items()}
     rest = {compiled.joint(k).name: float(compiled.qpos0[compiled.jnt_qposadr[k]]) for k in hinges}
     return "\n".join(
