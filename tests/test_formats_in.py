@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from pathlib import Path
 from typing import NamedTuple
 
@@ -12,12 +13,14 @@ from shell import Shell
 
 from fivebar_sim import FiveBar, dynamics, kinematics
 from fivebar_sim.arrays import Array
-from fivebar_sim.errors import ConfigError
+from fivebar_sim.errors import ConfigError, GeometryError
 from fivebar_sim.files import resources
 from fivebar_sim.formats import mjcf, subject, urdf
 from fivebar_sim.formats.incoming import preset
 from fivebar_sim.formats.incoming.understood import Understood, understand
+from fivebar_sim.geometry import MODES
 
+LONG = pytest.mark.long
 LEGS = tuple(resources.shipped("models/legs"))
 SOURCES = Path(__file__).parent / "sources"
 
@@ -145,6 +148,57 @@ def test_an_exported_leg_comes_back(name: str, suffix: str, tmp_path: Path) -> N
         assert theirs.mass == pytest.approx(ours.mass, rel=1e-15)
         assert theirs.com == pytest.approx(ours.com, rel=1e-12, abs=1e-14 * leg.size)
         assert theirs.inertia == pytest.approx(ours.inertia, rel=1e-12)
+
+
+def drawn(rng: np.random.Generator) -> FiveBar:
+    """Return a leg with every number drawn, that some pose closes."""
+    while True:
+        # None of the four can be longer than the others together.
+        lengths = rng.uniform(0.07, 0.2, 4).tolist()
+        along = rng.uniform(-0.1, 0.2, 4).tolist()
+        across = rng.uniform(-0.05, 0.05, 4).tolist()
+        leg = FiveBar(
+            *lengths,
+            L5=float(rng.choice([0.0, 0.07])),
+            L6=float(rng.choice([0.0, 0.04])),
+            tilt=float(rng.uniform(-1.5, 1.5)),
+            mode=MODES[rng.integers(4)],
+            assembly=int(rng.choice([-1, 1])),
+            mass=tuple(rng.uniform(0.001, 1.0, 4).tolist()),
+            com=tuple(along),
+            com_across=tuple(across),
+            inertia=tuple((10.0 ** rng.uniform(-8.0, -3.0, 4)).tolist()),
+            gravity=tuple(rng.uniform(-10.0, 10.0, 2).tolist()),
+        )
+        leg = dataclasses.replace(
+            leg,
+            # Undefined where there is nothing that it turns.
+            bend=float(rng.uniform(-3.0, 3.0)) if leg.L6 else 0.0,
+            tilt=leg.tilt if leg.L5 else 0.0,
+        )
+        try:
+            kinematics.home(leg)
+        except GeometryError:
+            continue
+        return leg
+
+
+@pytest.mark.parametrize("count", [pytest.param(3, id="few"), pytest.param(300, marks=LONG)])
+def test_any_leg_comes_back(count: int, tmp_path: Path) -> None:
+    """In every mode, tilted, with gravity anywhere and centres off the lines; A and E by name."""
+    rng = np.random.default_rng(20)
+    for _ in range(count):
+        leg = drawn(rng)
+        what = dataclasses.replace(subject.load("classic"), leg=leg)
+        for writer, name in ((mjcf, "leg.xml"), (urdf, "leg.urdf")):
+            writer.write(what, tmp_path / name)
+            back = understand(tmp_path / name, motors=("A", "E"), foot_name="foot").leg
+            assert (back.mode, back.assembly) == (leg.mode, leg.assembly)
+            for key in (*MEASURED, "com", "com_across", "gravity"):
+                wanted = pytest.approx(getattr(leg, key), rel=1e-11, abs=1e-12)
+                assert getattr(back, key) == wanted, key
+            assert back.mass == leg.mass
+            assert back.inertia == pytest.approx(leg.inertia, rel=1e-11)
 
 
 def test_a_robots_leg_is_taken_by_its_loop(tmp_path: Path) -> None:

@@ -1,7 +1,7 @@
 """The plane of a five-bar: which way it lies in space, and where its points are in it.
 
-The hip frame has x forward and z up: up is against gravity, as far as it lies in the plane, or the
-world's z or y if it does not; forward is the world's x, or its y in a plane across it.
+The hip frame has x forward and z up: up is the world's z, or its y if the plane lies flat; forward
+is the world's x, or its y in a plane across it.
 """
 
 from __future__ import annotations
@@ -126,7 +126,7 @@ def find(source: Source, loop: Loop) -> Plane:
     off = _check_parallel(source, loop, posed, normal)
     _check_gap(source, loop, posed, normal)
 
-    z = _up(source, normal)
+    z = _up(normal)
     x = np.cross(z, normal)
     # Forward: of the two ways to look at the plane, the one with the world's x, or y, to the right.
     forward = x[0] if abs(x[0]) > 1e-6 else x[1]
@@ -184,11 +184,10 @@ def _check_gap(source: Source, loop: Loop, posed: Posed, normal: Array) -> None:
             )
 
 
-def _up(source: Source, normal: Array) -> Array:
+def _up(normal: Array) -> Array:
     """Return the direction in the plane that points up, (3,)."""
-    for up in (-np.array(source.model.opt.gravity), np.eye(3)[2], np.eye(3)[1]):
-        within = up - normal * (normal @ up)
-        # Half: of z and y, at least one is in the plane by more than that.
-        if np.linalg.norm(within) > 0.5 * np.linalg.norm(up) > 0.0:
-            return within / np.linalg.norm(within)
-    raise AssertionError("a plane has z or y in it")
+    z = np.array([0.0, 0.0, 1.0])
+    # Flat: the plane is nearer to level than to upright.
+    up = z if abs(normal @ z) < np.sqrt(0.5) else np.array([0.0, 1.0, 0.0])
+    within = up - normal * (normal @ up)
+    return within / np.linalg.norm(within)

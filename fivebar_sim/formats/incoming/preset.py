@@ -29,8 +29,8 @@ UNITS = {
     "gravity": "m/s^2",
 }
 
-REACH = math.tau
-"""Range beyond which a joint's limits are no limits of a leg [rad]."""
+REACH = 6.28
+"""Range from which on a joint's limits are a whole turn, and no limits [rad]."""
 
 
 def rows(seen: Understood) -> Iterator[tuple[str, str, str]]:
@@ -59,19 +59,21 @@ def rows(seen: Understood) -> Iterator[tuple[str, str, str]]:
 
 
 def _hinge(seen: Understood, k: int) -> str:
-    """Return what a motor's angle is, and its limits."""
+    """Return what the angle of a hinge is, and its limits."""
     joint = seen.loop.hinges[k]
-    if HINGES[k] not in "AE" or joint == CLOSING:
+    if joint == CLOSING or HINGES[k] == "C":
         return "passive"
     model = seen.source.model
     sign, offset = seen.reading(k)
+    driven = HINGES[k] in "AE"
 
     shift = f" {offset:+.6g} rad" if offset else ""
-    parts = [f"theta_{HINGES[k]} = {'' if sign > 0 else '-'}q{shift}"]
+    parts = [f"theta_{HINGES[k]} = {'' if sign > 0 else '-'}q{shift}" if driven else "passive"]
     ends = sorted(sign * each + offset for each in model.jnt_range[joint].tolist())
     if model.jnt_limited[joint] and ends[1] - ends[0] < REACH:
-        parts.append(f"in [{ends[0]:.4g}, {ends[1]:.4g}] rad")
-    torque = _torque(seen, joint)
+        which = "" if driven else f"theta_{HINGES[k]} "
+        parts.append(f"{which}in [{ends[0]:.4g}, {ends[1]:.4g}] rad")
+    torque = _torque(seen, joint) if driven else None
     if torque is not None:
         parts.append(f"up to {units.text(torque, 'N m')}")
     return ", ".join(parts)

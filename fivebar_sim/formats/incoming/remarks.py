@@ -35,6 +35,10 @@ def remarks(source: Source, loop: Loop, plane: Plane, foot: Foot) -> Iterator[st
     rotors = [armature(source, loop, k) for k in SIDES]
     if rotors[0] != rotors[1]:
         yield f"rotor inertia differs, {rotors[0]:g} and {rotors[1]:g} kg m^2: that of A is taken"
+
+    for k in np.flatnonzero(source.model.tendon_stiffness > 0.0):
+        name = source.model.tendon(int(k)).name or f"tendon {k}"
+        yield f"{name}: a spring between joints is not of a leg"
     if plane.off > 1e-9:
         yield f"axes are up to {plane.off:.2g} rad off parallel: taken as parallel"
     if foot.radius is None:
