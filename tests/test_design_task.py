@@ -93,6 +93,19 @@ def test_bad_task_is_refused_in_one_line(tmp_path: Path, old: str, new: str, mes
     assert "task.toml" in str(caught.value)
 
 
+def test_foot_that_jumps_is_refused(tmp_path: Path) -> None:
+    """Its rates are 0 between the jumps: the closed form would find no torque at all."""
+    (tmp_path / "foot.csv").write_text("time_s,x_mm,z_mm\n0,9,-75\n1,0,-70\n2,-9,-75\n", "utf-8")
+    for kind in ("linear", "hold"):
+        path = f'kind = "csv"\nfile = "foot.csv"\nperiodic = true\ninterpolation = "{kind}"\n'
+        text = PLAIN[: PLAIN.index("kind =")] + path
+        if kind == "linear":
+            assert load(tmp_path, text).motions
+            continue
+        with pytest.raises(ConfigError, match=r'motion.walk: path.interpolation must be "cubic"'):
+            load(tmp_path, text)
+
+
 def test_region_alone_has_no_torque(tmp_path: Path) -> None:
     text = PLAIN.split("[motion")[0]
     with pytest.raises(ConfigError, match=r"needs a \[motion.NAME\] or a \[region.NAME\]"):

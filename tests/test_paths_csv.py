@@ -10,7 +10,8 @@ import msgspec
 import numpy as np
 import pytest
 
-from fivebar_sim.errors import ConfigError
+from fivebar_sim import Scenario, run
+from fivebar_sim.errors import ArgumentError, ConfigError
 from fivebar_sim.paths import Csv, PathSpec
 
 TROT = Path(__file__).parents[1] / "scenarios" / "q8bot_trot.csv"
@@ -52,6 +53,84 @@ def test_csv_of_a_cubic_is_that_cubic(tmp_path: Path) -> None:
     np.testing.assert_allclose(foot.position, (0.00128, -0.0752), rtol=1e-13)
     np.testing.assert_allclose(foot.velocity, (0.0096, 0.024), rtol=1e-13)
     np.testing.assert_allclose(foot.acceleration, (0.048, 0.06), rtol=1e-12)
+
+
+RECTANGLE = """time_s,x_mm,z_mm
+0.00,20,-80
+0.05,10,-80
+0.10,0,-80
+0.15,-10,-80
+0.20,-20,-80
+0.25,-20,-70
+0.30,-10,-70
+0.35,0,-70
+0.40,10,-70
+0.45,20,-70
+"""
+"""A gait along a rectangle, ten points in half a second."""
+
+
+def test_only_the_spline_overshoots_a_rectangle(tmp_path: Path) -> None:
+    times = np.linspace(0.0, 0.5, 2001)
+    low = (-0.02, -0.08)
+    high = (0.02, -0.07)
+    worst = {}
+    for kind in ("cubic", "linear", "hold"):
+        path = csv(tmp_path, RECTANGLE, periodic=True, interpolation=kind)
+        foot = path.nominal(times).position
+        beyond = np.maximum(foot - high, low - foot)
+        worst[kind] = beyond.max(axis=0)
+    np.testing.assert_allclose(worst["cubic"], (1.579e-3, 1.064e-3), atol=1e-6)
+    assert (worst["linear"] <= 1e-16).all()
+    assert (worst["hold"] == 0.0).all()
+
+
+def test_lines_and_steps_through_the_points(tmp_path: Path) -> None:
+    for periodic in (False, True):
+        middle = 0.5 * (KNOTS[1:] + KNOTS[:-1])
+        length = np.diff(KNOTS)[:, None]
+        lines = csv(tmp_path, table(), periodic=periodic, interpolation="linear").nominal(middle)
+        np.testing.assert_allclose(lines.position, 0.5 * (FEET[1:] + FEET[:-1]), atol=1e-16)
+        np.testing.assert_allclose(lines.velocity, np.diff(FEET, axis=0) / length, rtol=1e-12)
+        assert (lines.acceleration == 0.0).all()
+
+        path = csv(tmp_path, table(), periodic=periodic, interpolation="hold")
+        np.testing.assert_array_equal(path.nominal(middle).position, FEET[:-1])
+        np.testing.assert_array_equal(path.nominal(KNOTS).position, FEET)
+        assert (path.nominal(middle).velocity == 0.0).all()
+        assert len(path.knots) == len(KNOTS) + periodic
+        assert path.jumps
+
+
+def test_interpolation_is_written_and_others_are_refused(tmp_path: Path) -> None:
+    path = csv(tmp_path, table(), interpolation="hold")
+    assert msgspec.to_builtins(path)["interpolation"] == "hold"
+    assert msgspec.to_builtins(csv(tmp_path, table()))["interpolation"] == "cubic"
+    word: Any = "holds"
+    with pytest.raises(ArgumentError, match=r"unknown interpolation 'holds'.*did you mean 'hold'"):
+        Csv(file="foot.csv", interpolation=word)
+
+
+@pytest.mark.parametrize(
+    ("settings", "trips"),
+    [
+        ("path.interpolation=linear", False),
+        ("path.interpolation=linear controller.feedforward=velocity", True),
+        ("path.interpolation=hold", True),
+        ("path.interpolation=hold servo=xl330", False),
+    ],
+)
+def test_jumps_that_a_run_does_not_resolve_trip_the_guard(
+    tmp_path: Path, settings: str, trips: bool
+) -> None:
+    """The plain servo's torque jumps with its command; the XL330's bus and limit let it last."""
+    (tmp_path / "foot.csv").write_text(RECTANGLE, "utf-8")
+    text = 'duration = 0.8\n[path]\nkind = "csv"\nfile = "foot.csv"\nperiodic = true\n'
+    (tmp_path / "mine.toml").write_text(text, "utf-8")
+    found = run(Scenario.load(tmp_path / "mine.toml", settings.split()))
+    lost = [guard.name for guard in found.measured.guards if not guard.ok]
+    assert ("jolts" in lost) == trips
+    assert (found.verdict == "fail") == trips
 
 
 @pytest.mark.parametrize(

@@ -32,18 +32,9 @@ KINDS: list[type[Any]] = [
     *(control.find(name) for name in control.known()),
 ]
 PURE = {
-    *(
-        "arithmetic",
-        "assembly",
-        "columns",
-        "derivative",
-        "duty",
-        "feedforward",
-        "file",
-        "flight",
-        "friction",
-    ),
-    *("integrator", "mass_error", "mode", "name", "outside", "periodic", "running", "scale"),
+    *("arithmetic", "assembly", "columns", "derivative", "duty", "feedforward", "file", "flight"),
+    *("friction", "integrator", "interpolation", "mass_error", "mode", "name", "outside"),
+    *("periodic", "running", "scale"),
     *("seed", "thrust"),
 }
 """Keys of which some class has no unit: words, counts, ratios."""

@@ -84,6 +84,11 @@ class FootPath(
         return math.inf
 
     @property
+    def jumps(self) -> bool:
+        """Whether the target jumps from place to place: its rates say nothing of the torque."""
+        return False
+
+    @property
     def end(self) -> float:
         """Last time at which the path is defined, span + ramp / 2 [s]; may be inf."""
         return self.span + 0.5 * self.ramp

@@ -1,4 +1,4 @@
-"""The foot path of a CSV file: a smooth spline in time through its points.
+"""The foot path of a CSV file: through its points a smooth spline in time, lines, or steps.
 
 The header is `time_s,x_mm,z_mm` or `time_s,x_m,z_m`, columns in any order; positions are in the
 hip frame. Lines that start with # are comments. Times are in seconds and need not be regular.
@@ -9,14 +9,14 @@ from __future__ import annotations
 import math
 from functools import cached_property
 from pathlib import Path
-from typing import NamedTuple, Self
+from typing import Literal, NamedTuple, Self, get_args
 
 import msgspec
 import numpy as np
 from numpy.typing import ArrayLike
 
 from fivebar_sim.arrays import Array
-from fivebar_sim.errors import ArgumentError, ConfigError
+from fivebar_sim.errors import ArgumentError, ConfigError, unknown
 from fivebar_sim.paths.base import TIME_ROUNDING, FootPath, Sample, check_number
 from fivebar_sim.paths.spline import Spline
 from fivebar_sim.paths.track import TimedPairs, read_bytes, read_track
@@ -25,6 +25,8 @@ HEADERS = {("time_s", "x_mm", "z_mm"): 1e-3, ("time_s", "x_m", "z_m"): 1.0}
 """The legal headers, each with its unit in metres."""
 
 WHAT = "foot path"
+
+Interpolation = Literal["cubic", "linear", "hold"]
 
 
 class _Curve(NamedTuple):
@@ -35,7 +37,7 @@ class _Curve(NamedTuple):
 
 # dict=True: cached_property stores its value in the object's __dict__, which a Struct lacks.
 class Csv(FootPath, frozen=True, tag="csv", dict=True):
-    """A cubic spline in time through the points of a CSV file, smooth up to the acceleration.
+    """A path in time through the points of a CSV file, by default smooth up to the acceleration.
 
     The file's first time becomes t = 0. The file is read when first needed, once per object;
     `resolve` reads it at once.
@@ -47,17 +49,24 @@ class Csv(FootPath, frozen=True, tag="csv", dict=True):
         file: Name of the CSV, relative to the scenario's folder (unresolved: the current one).
         periodic: Whether the path repeats, smoothly across the seam; else it ends with its file.
         given: The key `period` of a table: overrides the rule above [s].
+        interpolation: Between the points: "cubic", a spline, which overshoots at corners; "linear",
+            straight lines at constant speed, which jumps from line to line; "hold", the last
+            point until the next one comes, as from a controller that sends them one by one.
     """
 
     file: str
     periodic: bool = False
     given: float | None = msgspec.field(default=None, name="period")
+    interpolation: Interpolation = "cubic"
 
     def __post_init__(self) -> None:
         super().__post_init__()
         # No system takes a null byte in a name: Python raises a bare ValueError for one.
         if not self.file or "\0" in self.file:
             raise ArgumentError(f"file must be the name of a CSV file, got {self.file!r}")
+        kinds = get_args(Interpolation)
+        if self.interpolation not in kinds:
+            raise ArgumentError(unknown("interpolation", str(self.interpolation), kinds))
         if self.given is not None:
             check_number("period", self.given, "s", low=0.0, strict=True)
             if not self.periodic:
@@ -74,14 +83,21 @@ class Csv(FootPath, frozen=True, tag="csv", dict=True):
         return self._curve.span if self._curve.period is None else math.inf
 
     @property
+    def jumps(self) -> bool:
+        """Whether the target jumps from point to point."""
+        return self.interpolation == "hold"
+
+    @property
     def knots(self) -> Array:
         """Times of the points, of the first one once more where a period ends [s], (n,)."""
-        return self._curve.spline.knots
+        knots = self._curve.spline.knots
+        return knots[np.isfinite(knots)]
 
     def nominal(self, time: ArrayLike) -> Sample:
-        """Return the spline and its own derivatives; see `FootPath.nominal`.
+        """Return the path and its own derivatives; see `FootPath.nominal`.
 
-        The boundary is periodic, or else "not-a-knot".
+        The spline's boundary is periodic, or else "not-a-knot". Lines and steps have the rates that
+        hold until the next point: the jumps there have none.
 
         Raises:
             ArgumentError: Unless every time is in [0, span].
@@ -126,10 +142,18 @@ class Csv(FootPath, frozen=True, tag="csv", dict=True):
                     f"{self.file}: ramp must be in [0, {track.span:g}] s, the time that the path "
                     f"lasts, got {self.ramp:g} s"
                 )
-            return _Curve(Spline.through(*track), track.span, None)
+            return _Curve(self._through(*track), track.span, None)
 
         time, foot = _close_loop(track, self.given, self.file)
-        return _Curve(Spline.through(time, foot, periodic=True), track.span, float(time[-1]))
+        return _Curve(self._through(time, foot), track.span, float(time[-1]))
+
+    def _through(self, time: Array, foot: Array) -> Spline:
+        """Return what lies between the points."""
+        if self.interpolation == "linear":
+            return Spline.straight(time, foot)
+        if self.interpolation == "hold":
+            return Spline.steps(time, foot)
+        return Spline.through(time, foot, periodic=self.periodic)
 
 
 def _close_loop(track: TimedPairs, period: float | None, where: str) -> TimedPairs:

@@ -1,4 +1,4 @@
-"""Cubic splines through points in time: twice smooth, in NumPy alone.
+"""Cubic splines through points in time: twice smooth, in NumPy alone; and lines and steps instead.
 
 A piece of the spline between two knots is the cubic with the points and the slopes there. Equal
 second derivatives on both sides of each inner knot give one equation for three slopes,
@@ -49,6 +49,29 @@ class Spline(NamedTuple):
         bend = (start + slope[1:] - 2.0 * mean) / length
         square = (mean - start) / length - bend
         return cls(time, np.stack([point[:-1], start, square, bend / length]))
+
+    @classmethod
+    def straight(cls, time: Array, point: Array) -> Self:
+        """Return the straight lines from point to point, whose slope jumps at the points.
+
+        Args:
+            time: Growing [s], (n,), at least 2.
+            point: (n, d).
+        """
+        mean = np.diff(point, axis=0) / np.diff(time)[:, np.newaxis]
+        none = np.zeros_like(mean)
+        return cls(time, np.stack([point[:-1], mean, none, none]))
+
+    @classmethod
+    def steps(cls, time: Array, point: Array) -> Self:
+        """Return the points held until the next one comes; the last piece has no end.
+
+        Args:
+            time: Growing [s], (n,).
+            point: (n, d).
+        """
+        none = np.zeros_like(point)
+        return cls(np.append(time, np.inf), np.stack([point, none, none, none]))
 
     def evaluate(self, time: Array) -> tuple[Array, Array, Array]:
         """Return the points and their first two derivatives at times of any shape.

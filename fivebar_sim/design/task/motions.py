@@ -241,7 +241,12 @@ class Cover(NamedTuple):
 
 
 def check_load(motion: FootMotion) -> None:
-    """Raise unless payload and weight are in range, and the force fits the path."""
+    """Raise unless payload and weight are in range, and path and force have a torque."""
+    if motion.path.jumps:
+        raise ArgumentError(
+            'path.interpolation must be "cubic" or "linear", got "hold": no closed form has the '
+            "torque of a foot that jumps"
+        )
     check_number("payload", motion.payload, "kg", low=0.0, high=HEAVIEST)
     check_number("weight", motion.weight, "", low=0.0, strict=True)
     sampled(motion, 2)
