@@ -20,13 +20,13 @@ from fivebar_sim.design.proof.simulate import Simulated
 from fivebar_sim.design.proof.table import Proof
 from fivebar_sim.design.report import charts, words
 from fivebar_sim.design.report.axes import Axis, amount
-from fivebar_sim.design.report.legs import thinned
 from fivebar_sim.design.report.script import SCRIPT
 from fivebar_sim.design.report.study import Built, Study, to_simulate
 from fivebar_sim.design.report.write import write
 from fivebar_sim.design.robust.sensitivity import Sensitivity
 from fivebar_sim.design.robust.tolerance import Yield
 from fivebar_sim.design.search import front
+from fivebar_sim.render.leg_lines import thinned
 
 
 @pytest.fixture(scope="module")

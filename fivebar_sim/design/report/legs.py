@@ -7,18 +7,13 @@ from html import escape
 
 import numpy as np
 
-from fivebar_sim import kinematics, motion, workspace
 from fivebar_sim.arrays import Array
 from fivebar_sim.design.report.charts import svg
 from fivebar_sim.design.task.task import Task
-from fivebar_sim.errors import FiveBarError
-from fivebar_sim.geometry import FiveBar
+from fivebar_sim.render import leg_lines
 
 WIDTH = 540.0
 """Width of the picture."""
-
-COARSE = 0.004
-"""Finest detail of a boundary, as a part of the leg's size."""
 
 
 class Drawn:
@@ -31,10 +26,10 @@ class Drawn:
 
     def __init__(self, task: Task, row: Array) -> None:
         self.leg = task.leg_of(row)
-        self.edges = [thinned(c, COARSE * self.leg.size) for c in _edges(self.leg)]
+        self.edges = leg_lines.edges(self.leg)
         self.paths = [m.path.at(m.times(160)).position for m in task.motions_of(row)]
         self.regions = [c.region.points(400) for c in task.covers_of(row)]
-        self.chains = _chains(self.leg, self._foot())
+        self.chains = leg_lines.chains(self.leg, self._foot())
 
     def _foot(self) -> Array | None:
         """Return where the foot is drawn: at the lowest point of the first path."""
@@ -95,58 +90,6 @@ def _bar(scale: float, height: float) -> str:
         f'<text class="tick left" style="text-anchor: start" x="{end + 6:.1f}" '
         f'y="{height - 8:.1f}">{escape(text)}</text>'
     )
-
-
-def _edges(leg: FiveBar) -> list[Array]:
-    try:
-        return workspace.boundary(leg, mode=leg.mode)
-    # A leg whose sides never meet reaches nothing: the page still shows the others.
-    except FiveBarError:
-        return []
-
-
-def _chains(leg: FiveBar, foot: Array | None) -> dict[str, Array]:
-    """Return the chains of both motors with the foot at a point, or at rest."""
-    q = kinematics.home(leg)
-    if foot is not None:
-        try:
-            q = motion.poses(leg, foot[None])[0]
-        # Beyond a stop, which a search may allow: at rest then.
-        except FiveBarError:
-            pass
-    joints = kinematics.chain_points(leg, q)
-    A, E = kinematics.bases(leg)
-    left = [A, joints.B, joints.C_left]
-    if leg.L6 > 0.0:
-        left.append(joints.F)
-    return {"A": np.array(left), "E": np.array([E, joints.D, joints.C_right])}
-
-
-def thinned(curve: Array, tolerance: float) -> Array:
-    """Return a curve with fewer points, none of which is farther from it than a tolerance.
-
-    Args:
-        curve: (n, 2).
-        tolerance: [m].
-    """
-    kept = [0, len(curve) - 1]
-    pending = [(0, len(curve) - 1)]
-    # By Douglas and Peucker; not recursive, since curves may have thousands of points.
-    while pending:
-        first, last = pending.pop()
-        if last - first < 2:
-            continue
-        inner = curve[first + 1 : last]
-        along = curve[last] - curve[first]
-        length = float(np.hypot(*along))
-        off = inner - curve[first]
-        away = np.hypot(*off.T) if length == 0.0 else np.abs(off @ [-along[1], along[0]]) / length
-        worst = int(np.argmax(away))
-        if away[worst] > tolerance:
-            middle = first + 1 + worst
-            kept.append(middle)
-            pending += [(first, middle), (middle, last)]
-    return curve[sorted(set(kept))]
 
 
 def _hull(points: Array) -> Array:
