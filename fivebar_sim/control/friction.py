@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
 from typing import Literal, get_args
 
 import msgspec
@@ -88,18 +89,18 @@ class Friction(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=
     def __post_init__(self) -> None:
         if self.model not in get_args(Kind):
             raise ArgumentError(unknown("friction.model", str(self.model), get_args(Kind)))
-        for field in msgspec.structs.fields(self)[1:]:
-            value = getattr(self, field.name)
-            if field.name in ("rate_stribeck", "alpha"):
-                check_number(f"friction.{field.name}", value, "", low=1e-6, high=1e6)
-            elif field.name in ("base", "viscous", "stribeck"):
-                check_number(f"friction.{field.name}", value, "", low=0.0, high=1e6)
+        for name, default in _numbers():
+            value = getattr(self, name)
+            if name in ("rate_stribeck", "alpha"):
+                check_number(f"friction.{name}", value, "", low=1e-6, high=1e6)
+            elif name in ("base", "viscous", "stribeck"):
+                check_number(f"friction.{name}", value, "", low=0.0, high=1e6)
             else:
                 # From 1 on the gear could not be driven by any torque.
-                check_number(f"friction.{field.name}", value, "", low=0.0, high=1.0)
-            if value != field.default and field.name not in TAKES[self.model]:
+                check_number(f"friction.{name}", value, "", low=0.0, high=1.0)
+            if value != default and name not in TAKES[self.model]:
                 raise ArgumentError(
-                    f"friction.{field.name} has no use in model {self.model!r}, which takes "
+                    f"friction.{name} has no use in model {self.model!r}, which takes "
                     f"{', '.join(TAKES[self.model])}"
                 )
 
@@ -126,7 +127,13 @@ class Friction(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=
         return self.model != "constant"
 
 
-NUMBERS = tuple(field.name for field in msgspec.structs.fields(Friction)[1:])
+@cache
+def _numbers() -> tuple[tuple[str, float], ...]:
+    """Return name and default of every number of a friction: every run makes some frictions."""
+    return tuple((field.name, field.default) for field in msgspec.structs.fields(Friction)[1:])
+
+
+NUMBERS = tuple(name for name, _ in _numbers())
 """The keys of `Friction` but the model."""
 
 

@@ -6,6 +6,7 @@ import math
 import re
 import tomllib
 from collections.abc import Iterable, Iterator, Mapping
+from functools import cache
 from pathlib import Path
 from typing import Any, TypeVar, get_args, get_type_hints
 
@@ -190,8 +191,14 @@ def bounds(
 
 def keys(kind: type) -> list[str]:
     """Return the keys that a Struct takes, including its tag's."""
+    return list(_keys(kind))
+
+
+@cache  # msgspec compiles the annotations of a class anew each time
+def _keys(kind: type) -> tuple[str, ...]:
+    """Return what `keys` does."""
     tag = kind.__struct_config__.tag_field
-    return [*([tag] if tag else []), *(f.encode_name for f in msgspec.structs.fields(kind))]
+    return (*([tag] if tag else []), *(f.encode_name for f in msgspec.structs.fields(kind)))
 
 
 WORDS = {
