@@ -96,7 +96,7 @@ def within(node: ast.AST) -> Iterator[ast.stmt]:
         yield from within(each)
 
 
-@functools.lru_cache(maxsize=1)
+@functools.cache
 def parsed(source: str) -> ast.Module:
     """Return a source's tree, once for all that is asked of it."""
     return ast.parse(source)

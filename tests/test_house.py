@@ -8,7 +8,7 @@ import importlib.util
 import subprocess
 import sys
 import warnings
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from functools import cache
 from pathlib import Path
 
@@ -67,6 +67,14 @@ PURE = (
     "tasks.episodes",
 )
 HEAVY = {"mujoco", "rerun", "matplotlib", "scipy"}
+
+
+@pytest.fixture(scope="module", autouse=True)
+def trees() -> Iterator[None]:
+    """Forget the trees of all files when nobody asks for them any more."""
+    yield
+    house.parsed.cache_clear()
+    imports.cache_clear()
 
 
 def name(path: Path) -> str:
