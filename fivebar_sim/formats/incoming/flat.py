@@ -94,6 +94,26 @@ class Posed:
         parent = int(self._source.model.body_parentid[child])
         return self.point(child if child in bodies else parent, self.data.xanchor[joint])
 
+    def bent(self, plane: Plane, k: int, inner: int) -> float:
+        """Return by how much hinge k must turn for a weld that the pose does not keep [rad].
+
+        Args:
+            plane: The leg's plane.
+            k: The hinge.
+            inner: Its inner link.
+        """
+        joint = self._loop.hinges[k]
+        if joint == CLOSING:
+            return 0.0
+        child = int(self._source.model.jnt_bodyid[joint])
+        parent = int(self._source.model.body_parentid[child])
+        moved = {child, parent} & set(self._loop.welded)
+        if not moved:
+            return 0.0
+        x, z = self.flat(plane, self._turn @ (self.ground() @ plane.x))
+        turned = math.atan2(z, x)
+        return turned if moved <= set(self._loop.links[inner]) else -turned
+
     def axis(self, k: int) -> Array | None:
         """Return the axis of hinge k in the world, (3,); None of a closure."""
         joint = self._loop.hinges[k]

@@ -41,11 +41,14 @@ def angles(source: Source, loop: Loop, plane: Plane, pose: Array) -> Array:
         pose: The pose, (nq,); the loop may be open.
     """
     posed = Posed(source, loop, pose)
-    psi = []
-    for link in (1, 2, 4, 3):
+    psi = {0: 0.0}
+    for link in (1, 2, 3, 4):
         inner, outer = ends(posed, plane, link)
-        psi.append(float(np.arctan2(*(outer - inner)[::-1])))
-    return np.array([psi[0], wrap(psi[1] - psi[0]), psi[2], wrap(psi[3] - psi[2])])
+        psi[link] = float(np.arctan2(*(outer - inner)[::-1]))
+
+    hinges = ((0, 0, 1), (1, 1, 2), (4, 0, 4), (3, 4, 3))
+    turned = [psi[out] - psi[inn] + posed.bent(plane, k, inn) for k, inn, out in hinges]
+    return wrap(np.array(turned))
 
 
 def settle(source: Source, loop: Loop, plane: Plane, leg: FiveBar) -> tuple[FiveBar, str | None]:
