@@ -14,7 +14,8 @@ from fivebar_sim.errors import ArgumentError, ConfigError, LoopOpenError
 from fivebar_sim.geometry import FiveBar
 from fivebar_sim.kinematics.foot_motion import foot_motion
 from fivebar_sim.logs import load
-from fivebar_sim.paths import Angles
+from fivebar_sim.paths import Angles, Csv
+from fivebar_sim.scenario import forces
 
 FOLDER = Path(__file__).parent / "logs"
 CLASSIC = FiveBar.load("classic")
@@ -81,6 +82,41 @@ def test_any_log_is_a_path_by_its_columns() -> None:
     stamps = {"time": "stamp", "theta_A": "q_A", "theta_E": "q_E"}
     found = scenario(file="log.parquet", columns=stamps).path.nominal(TRUTH.time).position
     np.testing.assert_allclose(found, due, atol=1e-8)
+
+
+def test_angles_may_be_taken_as_given() -> None:
+    middle = 0.5 * (TRUTH.time[1:] + TRUTH.time[:-1])
+    theta = TRUTH.pair("theta")
+    lines = scenario(interpolation="linear").path
+    halfway = kinematics.forward(CLASSIC, 0.5 * (theta[1:] + theta[:-1]))
+    np.testing.assert_allclose(lines.nominal(middle).position, halfway, atol=1e-12)
+    held = scenario(interpolation="hold").path
+    due = kinematics.forward(CLASSIC, theta)
+    np.testing.assert_allclose(held.nominal(middle).position, due[:-1], rtol=0.0, atol=1e-12)
+    assert not held.nominal(middle).velocity.any()
+    for path in (lines, held):
+        np.testing.assert_allclose(path.nominal(TRUTH.time).position, due, rtol=0.0, atol=1e-12)
+        assert path.span == TRUTH.time[-1]
+
+
+@pytest.mark.parametrize("kind", ["path", "force"])
+def test_any_log_is_a_foot_path_or_a_force_by_its_columns(kind: str, tmp_path: Path) -> None:
+    unit = "mm" if kind == "path" else "mN"
+    rows = "".join(f"{5 * k};{k},5;{-80 - k}\n" for k in range(5))
+    (tmp_path / "bench.csv").write_text("ms;vor;hoch\n" + rows)
+    columns = {
+        "time": {"column": "ms", "unit": "ms"},
+        "x": {"column": "vor", "unit": unit},
+        "z": {"column": "hoch", "unit": unit, "sign": -1},
+    }
+    table = {"file": "bench.csv", "columns": columns}
+    part: Any = Csv(**table, ramp=0.0) if kind == "path" else forces.Csv(**table)
+    part = part.resolve(tmp_path)
+    time = np.array([0.0, 0.005, 0.02])
+    found = part.nominal(time).position if kind == "path" else part.at(time, Csv(**table))
+    np.testing.assert_allclose(found, [[5e-4, 0.08], [1.5e-3, 0.081], [4.5e-3, 0.084]], atol=1e-15)
+    with pytest.raises(ConfigError, match="x is missing"):
+        msgspec.structs.replace(part, columns={"time": "ms", "z": "hoch"}).check_file()
 
 
 # edge

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any, Self
+from typing import Any, Literal, Self
 
 import msgspec
+import numpy as np
 from numpy.typing import ArrayLike
 
 from fivebar_sim import logs
+from fivebar_sim.arrays import Array
 from fivebar_sim.errors import ArgumentError, ConfigError
 from fivebar_sim.geometry import FiveBar
 from fivebar_sim.kinematics.foot_motion import foot_motion
@@ -27,17 +29,20 @@ NEEDED = ("theta_A", "theta_E")
 class Angles(FootPath, frozen=True, tag="angles", dict=True):
     """The foot at the motor angles of a file, by the leg's forward kinematics.
 
-    Between its rows the angles are a cubic spline in time, so that the foot is smooth up to its
-    acceleration; at the rows the foot is exactly theirs. The file's first time becomes t = 0.
+    At the rows the foot is exactly theirs. Between them the angles are a cubic spline in time, so
+    that the foot is smooth up to its acceleration, or as they were given: on straight lines, or
+    held until the next row. The file's first time becomes t = 0.
 
     Attributes:
         file: CSV of any kind, JSON lines, Parquet or MCAP, relative to the scenario's folder.
         columns: Which column is what, as in a table [log]: time, theta_A, theta_E, and rate, start,
             end, jumps; left out: columns of these names, in SI units.
+        interpolation: Between the rows: "cubic", "linear" or "hold".
     """
 
     file: str
     columns: dict[str, Any] | None = None
+    interpolation: Literal["cubic", "linear", "hold"] = "cubic"
 
     @classmethod
     def of_log(cls, log: logs.Log) -> Self:
@@ -74,7 +79,8 @@ class Angles(FootPath, frozen=True, tag="angles", dict=True):
     @property
     def span(self) -> float:
         """The sampled span [s]."""
-        return float(self.spline.knots[-1])
+        time, _ = self.log.complete(*NEEDED)
+        return float(time[-1] - time[0])
 
     @property
     def spline(self) -> Spline:
@@ -82,7 +88,7 @@ class Angles(FootPath, frozen=True, tag="angles", dict=True):
         kept = vars(self)
         if "spline" not in kept:
             time, theta = self.log.complete(*NEEDED)
-            kept["spline"] = Spline.through(time - time[0], theta)
+            kept["spline"] = _pieces(time - time[0], theta, self.interpolation)
         return kept["spline"]
 
     def nominal(self, time: ArrayLike) -> Sample:
@@ -124,3 +130,18 @@ class Angles(FootPath, frozen=True, tag="angles", dict=True):
         bound = msgspec.structs.replace(self)
         vars(bound).update(vars(self), leg=leg)
         return bound
+
+
+def _pieces(time: Array, theta: Array, interpolation: str) -> Spline:
+    """Return angles between rows: a spline, straight lines, or each row until the next."""
+    if interpolation == "cubic":
+        return Spline.through(time, theta)
+    slope = np.diff(theta, axis=0) / np.diff(time)[:, np.newaxis]
+    none = np.zeros_like(slope)
+    if interpolation == "linear":
+        return Spline(time, np.stack([theta[:-1], slope, none, none]))
+
+    # The last row begins a piece too, or it would never be reached.
+    knots = np.append(time, 2.0 * time[-1] - time[-2])
+    still = np.zeros_like(theta)
+    return Spline(knots, np.stack([theta, still, still, still]))

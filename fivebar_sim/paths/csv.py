@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from functools import cached_property
 from pathlib import Path
-from typing import Literal, NamedTuple, Self, get_args
+from typing import Any, Literal, NamedTuple, Self, get_args
 
 import msgspec
 import numpy as np
@@ -17,9 +17,10 @@ from numpy.typing import ArrayLike
 
 from fivebar_sim.arrays import Array
 from fivebar_sim.errors import ArgumentError, ConfigError, unknown
+from fivebar_sim.logs import channels
 from fivebar_sim.paths.base import TIME_ROUNDING, FootPath, Sample, check_number
 from fivebar_sim.paths.spline import Spline
-from fivebar_sim.paths.track import TimedPairs, read_bytes, read_track
+from fivebar_sim.paths.track import TimedPairs, read_bytes, read_mapped, read_track
 
 HEADERS = {("time_s", "x_mm", "z_mm"): 1e-3, ("time_s", "x_m", "z_m"): 1.0}
 """The legal headers, each with its unit in metres."""
@@ -52,12 +53,15 @@ class Csv(FootPath, frozen=True, tag="csv", dict=True):
         interpolation: Between the points: "cubic", a spline, which overshoots at corners; "linear",
             straight lines at constant speed, which jumps from line to line; "hold", the last
             point until the next one comes, as from a controller that sends them one by one.
+        columns: Which column of a log of any kind is `time`, `x` and `z`, as in a table [log]; left
+            out: the header says so.
     """
 
     file: str
     periodic: bool = False
     given: float | None = msgspec.field(default=None, name="period")
     interpolation: Interpolation = "cubic"
+    columns: dict[str, Any] | None = None
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -133,9 +137,15 @@ class Csv(FootPath, frozen=True, tag="csv", dict=True):
         """All of the file, as it was when it was first needed; later changes do not count."""
         return read_bytes(Path(self.file), WHAT)
 
+    def _read(self) -> TimedPairs:
+        """Return the file's points."""
+        if self.columns is None:
+            return read_track(self.content, HEADERS, WHAT, Path(self.file))
+        return read_mapped(self.content, self.columns, channels.PATH, self.file)
+
     @cached_property
     def _curve(self) -> _Curve:
-        track = read_track(self.content, HEADERS, WHAT, Path(self.file))
+        track = self._read()
         if not self.periodic:
             if not self.ramp <= track.span:
                 raise ConfigError(

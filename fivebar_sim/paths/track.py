@@ -5,13 +5,15 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from fivebar_sim import logs
 from fivebar_sim.arrays import Array
 from fivebar_sim.errors import ConfigError, unknown
 from fivebar_sim.files import input_file
+from fivebar_sim.logs.channels import Channels
 
 Headers = Mapping[tuple[str, str, str], float]
 
@@ -108,6 +110,24 @@ def read_track(raw: bytes, headers: Headers, what: str, file: Path) -> TimedPair
     if len(rows) < 2:
         raise ConfigError(f"{file}: a {what} needs at least 2 rows, got {len(rows)}")
     return TimedPairs(table[:, 0] - table[0, 0], scale * table[:, 1:])
+
+
+def read_mapped(raw: bytes, table: Mapping[str, Any], known: Channels, where: str) -> TimedPairs:
+    """Return the rows of a log of any kind, by a table of its columns, SI units, from t = 0.
+
+    Args:
+        raw: All of the file.
+        table: Which column is which of the channels, as in a table [log].
+        known: The channels: time, x, z.
+        where: The file, for messages.
+
+    Raises:
+        ConfigError: What `logs.read` raises.
+    """
+    told = logs.read_map(dict(table), f"{where}: columns", known=known)
+    log = logs.read(raw, told, known, ("x", "z"), where)
+    time, pair = log.complete("x", "z")
+    return TimedPairs(time - time[0], pair)
 
 
 def _lines(raw: bytes, file: Path) -> list[tuple[int, list[str]]]:

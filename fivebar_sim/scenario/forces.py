@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from functools import cached_property
 from pathlib import Path
-from typing import Self, get_args
+from typing import Any, Self, get_args
 
 import msgspec
 import numpy as np
@@ -17,9 +17,10 @@ from numpy.typing import ArrayLike
 from fivebar_sim import paths
 from fivebar_sim.arrays import Array
 from fivebar_sim.errors import ArgumentError
+from fivebar_sim.logs import channels
 from fivebar_sim.paths import FootPath, Gait
 from fivebar_sim.paths.base import Pair, check_pair, times
-from fivebar_sim.paths.track import TimedPairs, read_bytes, read_track
+from fivebar_sim.paths.track import TimedPairs, read_bytes, read_mapped, read_track
 
 __all__ = ["KINDS", "Constant", "Csv", "FootForce", "ForceSpec", "Stance"]
 
@@ -127,9 +128,12 @@ class Csv(FootForce, frozen=True, tag="csv", dict=True):
 
     Attributes:
         file: Name of the CSV, relative to the scenario's folder (unresolved: the current one).
+        columns: Which column of a log of any kind is `time`, `x` and `z`, as in a table [log]; left
+            out: the header says so.
     """
 
     file: str
+    columns: dict[str, Any] | None = None
 
     def __post_init__(self) -> None:
         # No system takes a null byte in a name: Python raises a bare ValueError for one.
@@ -178,7 +182,9 @@ class Csv(FootForce, frozen=True, tag="csv", dict=True):
 
     @cached_property
     def _track(self) -> TimedPairs:
-        return read_track(self.content, HEADERS, WHAT, Path(self.file))
+        if self.columns is None:
+            return read_track(self.content, HEADERS, WHAT, Path(self.file))
+        return read_mapped(self.content, self.columns, channels.FORCE, self.file)
 
 
 ForceSpec = Constant | Csv | Stance
