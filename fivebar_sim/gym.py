@@ -257,7 +257,7 @@ def _row(outcome: Outcome) -> tuple[Array, dict[str, Any]]:
 
 
 def register() -> None:
-    """Register every task with Gymnasium, for one leg and for many; twice is harmless."""
+    """Register every task, for one leg and for many, and that of a robot; twice is harmless."""
     for kind in tasks.KINDS:
         name = f"fivebar/{kind.capitalize()}-v0"
         # Gymnasium warns when a name is registered twice.
@@ -268,6 +268,9 @@ def register() -> None:
                 vector_entry_point="fivebar_sim.vector:LegVectorEnv",
                 kwargs={"task": kind},
             )
+
+    if "fivebar/Walk-v0" not in gymnasium.registry:
+        gymnasium.register("fivebar/Walk-v0", entry_point="fivebar_sim.walking.env:WalkEnv")
 
 
 register()

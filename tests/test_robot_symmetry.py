@@ -40,8 +40,8 @@ def apart(one: Walk, other: Walk) -> float:
 
 
 def test_first_steps_are_mirrored_and_a_lopsided_robot_s_are_not() -> None:
-    """Two periods, to rounding; a trunk whose weight is 1 mm to the left shows."""
-    short = ["duration=0.3", "path.ramp=0.1"]
+    """More than a period, to rounding; a trunk whose weight is 1 mm to the left shows."""
+    short = ["duration=0.24", "path.ramp=0.05"]
     first = went(*short)
     other = went(*short, OTHER)
     assert apart(first, other) < 1e-12

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import msgspec
 import numpy as np
 
-from fivebar_sim.robots import Floor
+from fivebar_sim.robots import Floor, Robot
 from fivebar_sim.robots.jump import Jump
 from fivebar_sim.robots.measure import Gone, measure
 from fivebar_sim.robots.scenario import RobotScenario
@@ -67,13 +67,31 @@ def draw(
     return [_with(scenario, *row) for row in drawn.tolist()]
 
 
+def draw_robot(robot: Robot, ranges: Ranges, random: np.random.Generator) -> tuple[Robot, float]:
+    """Return a robot of another mass, its servos late by another delay, and a floor's friction.
+
+    Args:
+        robot: The robot.
+        ranges: What is drawn.
+        random: What draws.
+    """
+    ends = np.array(ranges)
+    friction, mass, delay = random.uniform(ends[:, 0], ends[:, 1]).tolist()
+    return _changed(robot, mass, delay), friction
+
+
+def _changed(robot: Robot, mass: float, delay: float) -> Robot:
+    """Return a robot with its mass multiplied and its servos later."""
+    servo = msgspec.structs.replace(robot.servo, delay=max(robot.servo.delay + delay, 0.0))
+    return msgspec.structs.replace(robot, mass=mass * robot.mass, servo=servo)
+
+
 def _with(scenario: RobotScenario, friction: float, mass: float, delay: float) -> RobotScenario:
     """Return a scenario with another friction, mass and delay."""
-    servo = msgspec.structs.replace(scenario.servo, delay=max(scenario.servo.delay + delay, 0.0))
-    robot = msgspec.structs.replace(scenario.robot, mass=mass * scenario.robot.mass, servo=servo)
+    robot = _changed(msgspec.structs.replace(scenario.robot, servo=scenario.servo), mass, delay)
     floor = scenario.scene if isinstance(scenario.scene, Floor) else Floor()
     scene = msgspec.structs.replace(floor, friction=friction)
-    return msgspec.structs.replace(scenario, robot=robot, servo=servo, scene=scene)
+    return msgspec.structs.replace(scenario, robot=robot, servo=robot.servo, scene=scene)
 
 
 def outcomes(scenarios: Sequence[RobotScenario], nthread: int = 1) -> list[Outcome]:
