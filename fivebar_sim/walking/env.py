@@ -92,6 +92,8 @@ class WalkEnv(gymnasium.Env[Array, Array]):
         assert self._model is not None
         start = self._model.key("stand").qpos.copy()
         self._standing = start[7:][MOTORS].reshape(len(LEGS), 2)
+        gravity = self._model.opt.gravity
+        self._gravity = gravity / np.linalg.norm(gravity)
         self._legs = Legs(self._model, start[None])
         self._control = ControlStep(
             self.robot.servo,
@@ -143,6 +145,17 @@ class WalkEnv(gymnasium.Env[Array, Array]):
         info = {"terms": terms, "reason": fell[0].why if fell else ""}
         return self._observation(), sum(terms.values()), bool(fell), over, info
 
+    @property
+    def down(self) -> Array:
+        """Direction of gravity in the trunk's frame, without noise, (3,)."""
+        # It leans where the floor rises: the world's axes are the floor's.
+        return self._gravity @ rotation(self._qpos[-1:, 3:7])[0]
+
+    @property
+    def theta(self) -> Array:
+        """Angles of the motors, without noise [rad], (4, 2)."""
+        return self._qpos[-1, 7:][MOTORS].reshape(len(LEGS), 2)
+
     def _build(self) -> None:
         """Build the robot's model: once, or for every episode if it is drawn."""
         task = self.task
@@ -151,9 +164,8 @@ class WalkEnv(gymnasium.Env[Array, Array]):
             self.robot, friction = draw_robot(task.robot, task.randomise, self.np_random)
         elif self._model is not None:
             return
-        self._model = model.build_robot(
-            self.robot, Floor(friction=friction), timestep=task.timestep
-        )
+        floor = Floor(friction=friction, slope=task.slope)
+        self._model = model.build_robot(self.robot, floor, timestep=task.timestep)
 
     def _trunk(self, before: Array) -> Trunk:
         """Return the trunk before the last control period and after each step of it."""
@@ -178,8 +190,9 @@ class WalkEnv(gymnasium.Env[Array, Array]):
     def _observation(self) -> Array:
         """Return what the robot knows."""
         seen = self._control.observe(self._k)
-        down = -rotation(self._qpos[-1:, 3:7])[0, 2]
-        gyro = self._qvel[-1, 3:6] + self.task.gyro_noise * self.np_random.standard_normal(3)
+        task = self.task
+        down = self.down + task.down_noise * self.np_random.standard_normal(3)
+        gyro = self._qvel[-1, 3:6] + task.gyro_noise * self.np_random.standard_normal(3)
         parts = [self._wanted, gyro, down, seen.theta, seen.theta_dot, self._action]
         return np.concatenate([np.ravel(part) for part in parts])
 

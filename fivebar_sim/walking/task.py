@@ -13,7 +13,7 @@ from fivebar_sim.checks import check_number
 from fivebar_sim.control.sensors import Sensors
 from fivebar_sim.control.step import check_whole_steps
 from fivebar_sim.errors import ArgumentError
-from fivebar_sim.robots import Robot
+from fivebar_sim.robots import Floor, Robot
 from fivebar_sim.robots.measure import Trunk, measure
 from fivebar_sim.walking.draws import Ranges
 
@@ -41,8 +41,10 @@ class WalkTask(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=
         turn: Ends of the turning rates that are commanded [rad/s].
         span: Farthest that an action moves a motor from its standing angle [rad].
         friction: Coulomb's coefficient between feet and floor.
+        slope: Angle by which the floor rises where the robot faces at the start [rad].
         sensors: What the motors' sensors show.
         gyro_noise: Standard deviation of the gyroscope's noise [rad/s].
+        down_noise: The same of each component of the direction of down.
         randomise: Friction, mass and delay are drawn anew for every episode; None: they are not.
         turning: Weight of turning.
         effort: Weight of the effort.
@@ -56,8 +58,10 @@ class WalkTask(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=
     turn: Range = (-1.0, 1.0)
     span: float = 0.5
     friction: float = 0.8
+    slope: float = 0.0
     sensors: Sensors = Sensors()
     gyro_noise: float = 0.0
+    down_noise: float = 0.0
     randomise: Ranges | None = None
     turning: float = 0.5
     effort: float = 0.1
@@ -71,8 +75,9 @@ class WalkTask(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=
             check_number(f"{name}[0]", low, "", low=-FASTEST, high=FASTEST)
             check_number(f"{name}[1]", high, "", low=float(low), high=FASTEST)
         check_number("span", self.span, "rad", low=0.0, high=math.pi, strict=True)
-        check_number("friction", self.friction, "", low=0.0, high=100.0)
+        Floor(friction=self.friction, slope=self.slope)  # for its checks
         check_number("gyro_noise", self.gyro_noise, "rad/s", low=0.0)
+        check_number("down_noise", self.down_noise, "", low=0.0)
         check_number("turning", self.turning, "", low=0.0)
         check_number("effort", self.effort, "", low=0.0)
         check_whole_steps("period", self.period, self.timestep)
