@@ -20,7 +20,7 @@ from shell import Said
 
 from fivebar_sim import cli
 from fivebar_sim.runs import directory
-from fivebar_sim.scenario import scenario
+from fivebar_sim.scenario import together
 
 STEPS = 2000
 """Steps that a run may have here; the program's own bound is tried in test_robust.py."""
@@ -53,7 +53,7 @@ class Bench:
         self.seen = Counter[str]()
         self.last = Said(0, "", "")
         monkeypatch.chdir(folder)
-        monkeypatch.setattr(scenario, "MOST_STEPS", STEPS)
+        monkeypatch.setattr(together, "MOST_STEPS", STEPS)
         for screen in ("DISPLAY", "WAYLAND_DISPLAY"):
             monkeypatch.delenv(screen, raising=False)
 

@@ -191,7 +191,7 @@ def test_line_rests_at_both_ends() -> None:
 
 def test_kinds_decode_by_name() -> None:
     periodic = ["circle", "csv", "ellipse", "figure-eight", "gait", "hop", "line"]
-    assert sorted(KINDS) == sorted([*periodic, "heights", "lines", "sine", "step"])
+    assert sorted(KINDS) == sorted([*periodic, "angles", "heights", "lines", "sine", "step"])
     for name, path in SHAPES.items():
         spec = msgspec.to_builtins(path)
         assert spec["kind"] == name

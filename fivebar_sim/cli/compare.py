@@ -30,7 +30,7 @@ def compare(
     quiet: bool = False,
     json: bool = False,
 ) -> int:
-    """Lay a real leg's log over the simulated leg, which is sent the log's commands.
+    """Lay a real leg's log over the simulated leg, sent its commands.
 
     Without commands in the log the scenario's own motion is run. Exit status 1 if a limit is
     broken, so that CI can guard that the model still fits the robot.

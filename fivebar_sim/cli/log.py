@@ -24,7 +24,7 @@ def log(
     leg: str | None = None,
     write: Annotated[Path | None, arg(name="map", metavar="TOML")] = None,
 ) -> int:
-    """Show what is in a log: columns, rate, gaps, ranges, and guesses what is what.
+    """Show what a log holds: columns, rate, gaps, ranges, and guesses.
 
     Args:
         file: CSV of any kind, JSON lines, Parquet or MCAP; or a TOML file with a table [log], whose
