@@ -135,7 +135,9 @@ def test_command(shell: Shell) -> None:
 
 def test_refusals(shell: Shell) -> None:
     assert "did you mean 'classic'" in shell.refused("export", "clasic", "--mjcf", "x.xml")
-    assert "known: doggo, minitaur, q8bot" in shell.refused("export", "classic", "--robot", "--mjcf", "x.xml")
+    assert "known: doggo, minitaur, q8bot" in shell.refused(
+        "export", "classic", "--robot", "--mjcf", "x.xml"
+    )
     assert "must end in .xml" in shell.refused("export", "classic", "--mjcf", "x.toml")
     assert "must end in .urdf" in shell.refused("export", "classic", "--urdf", "x")
     assert "one at a time" in shell.refused("export", "classic", "--mjcf", "x.xml", "--c", "x")

@@ -141,7 +141,12 @@ def test_kinds_go_to_a_table_and_come_back(name: str) -> None:
 def test_only_hops_need_a_ground_and_only_cycles_are_eased() -> None:
     assert [name for name, kind in KINDS.items() if kind.needs_ground] == ["hop"]
     default = {name: f.default for name, kind in KINDS.items() for f in _ramp(kind)}
-    assert {name for name, ramp in default.items() if ramp == 0.0} == {"heights", "hop", "lines", "step"}
+    assert {name for name, ramp in default.items() if ramp == 0.0} == {
+        "heights",
+        "hop",
+        "lines",
+        "step",
+    }
 
 
 def _ramp(kind: type[FootPath]) -> list[Any]:
