@@ -44,6 +44,7 @@ HEAD = """\
 #   TRAP knees assembly theta_A theta_E = ok B_x B_z D_x D_z ...
 #   TRAP jacobian assembly theta_A theta_E = ok dx/dA dx/dE dz/dA dz/dE ...
 #   TRAP torque assembly theta_A theta_E F_x F_z = ok tau_A tau_E ...
+#   TRAP nearest x z = ok x z ...
 """
 
 
@@ -111,6 +112,20 @@ def exact_points(name: str) -> Iterator[tuple[str, Array]]:
             yield "exact-edge", U * np.array(foot)
 
 
+def around(leg: FiveBar, rng: np.random.Generator) -> Iterator[tuple[str, Array]]:
+    """Yield points, most of them out of reach, with the name of their trap."""
+    A, E = kinematics.bases(leg)
+    for foot in rng.uniform(-1.5, 1.5, (12, 2)) * leg.size:
+        yield "anywhere", foot
+    for foot in rng.uniform(-0.4, 0.4, (8, 2)) * leg.size:
+        yield "inside", foot
+    yield "on-A", A
+    yield "on-E", E
+    yield "far", np.array([1e3, -1e3])
+    yield "nan", np.array([np.nan, -leg.L2])
+    yield "infinite", np.array([0.0, -np.inf])
+
+
 def angles(leg: FiveBar, rng: np.random.Generator) -> Iterator[tuple[str, Array]]:
     """Yield motor angles with the name of their trap."""
     for theta in rng.uniform(-np.pi, np.pi, (12, 2)):
@@ -159,6 +174,8 @@ def cases(name: str, leg: FiveBar, rng: np.random.Generator) -> Iterator[str | N
     for trap, theta in poses:
         for assembly in (-1, 1):
             yield from _pose(leg, trap, assembly, single(theta), rng)
+    for trap, foot in around(leg, rng):
+        yield line(leg, trap, "nearest", (), single(foot))
 
 
 def _pose(

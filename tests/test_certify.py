@@ -70,7 +70,7 @@ def test_every_answer_is_right_by_crossings_of_circles(right: ModuleType) -> Non
     """The independent controller of leg_programs/right.py, within the tolerance of float64."""
     for leg in LEGS:
         numbers = right.Leg(*map(float.fromhex, leg.numbers))
-        for case in leg.cases:
+        for case in (case for case in leg.cases if case.kind != "nearest"):
             inputs = [float.fromhex(word) for word in case.inputs]
             finite = all(map(math.isfinite, inputs))
             answer = right.SOLVERS[case.kind](numbers, inputs) if finite else None
@@ -83,6 +83,7 @@ def test_all_traps_are_there() -> None:
     for trap in ("edge-A", "edge-E", "exact-edge", "fold-A", "half-turn", "on-A", "nan", "far"):
         assert counts[trap, "inverse"] >= 10, trap
     assert counts["turns", "forward"] >= 20
+    assert counts["inside", "nearest"] >= 80
     by_name = {leg.name: judge.geometry_of(leg) for leg in LEGS}
     assert by_name["coaxial"].L5 == by_name["doggo"].L5 == 0.0
     assert by_name["turned"].tilt > math.pi / 2.0
@@ -210,7 +211,7 @@ def test_command_says_what_is_wrong_and_where(shell: Shell) -> None:
     assert said == (0, "", "")
     said = shell("certify", "--", sys.executable, str(PROGRAMS / "whole_degrees.py"))
     assert said.status == 0
-    assert said.out.endswith(" 0 wrong, 2704 not supported: pass\n")
+    assert said.out.endswith(" 0 wrong, 2962 not supported: pass\n")
     said = shell("certify", "--examples", "1", "--", sys.executable, str(PROGRAMS / "fallback.py"))
     assert said.status == 1
     first, second, *_, last = said.out.splitlines()

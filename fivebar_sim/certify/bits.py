@@ -35,10 +35,13 @@ def answers(leg: FiveBar, cases: Sequence[Case]) -> list[str]:
 
 def _solve(held: firmware.Leg, kind: str, inputs: Array) -> tuple[np.ndarray, np.ndarray]:
     """Return the numbers, (n, m), and statuses, (n,), of questions of one kind."""
-    first = inputs[:, 0].astype(int)
     # A number beyond float32 is infinite in it, as it is in C.
     with np.errstate(over="ignore"):
         values = inputs.astype(np.float32)
+    if kind == "nearest":
+        return firmware.nearest(held, values)
+
+    first = inputs[:, 0].astype(int)
     if kind == "inverse":
         return firmware.inverse(held, values[:, 2:4], first, inputs[:, 1].astype(int))
 

@@ -19,7 +19,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fivebar_sim import kinematics
+from fivebar_sim import kinematics, workspace
 from fivebar_sim.arrays import Array
 from fivebar_sim.errors import LoopOpenError, SingularError
 from fivebar_sim.geometry import FiveBar
@@ -56,12 +56,16 @@ def answer(leg: FiveBar, kind: str, values: Sequence[float]) -> Answer:
     Args:
         leg: The leg.
         kind: One of `suite.ANSWERS`.
-        values: The inputs; for `inverse` s_A, s_E, x, z; else the assembly mode first.
+        values: The inputs; for `inverse` s_A, s_E, x, z; for `nearest` x, z; else the assembly
+            mode first.
     """
     if not all(map(math.isfinite, values)):
         return REFUSE
     if kind == "inverse":
         return _inverse(leg, values)
+    # The others have a sign first.
+    if kind == "nearest":
+        values = [0, *values]
     try:
         numbers = evaluate(leg, kind, values)
     except (LoopOpenError, SingularError):
@@ -74,7 +78,7 @@ def answer(leg: FiveBar, kind: str, values: Sequence[float]) -> Answer:
 
 
 def evaluate(leg: FiveBar, kind: str, values: Sequence[float]) -> Array:
-    """Return the numbers that answer a question about given motor angles.
+    """Return the numbers that answer a question about given motor angles, or a given point.
 
     Raises:
         LoopOpenError: The links do not meet.
@@ -82,6 +86,8 @@ def evaluate(leg: FiveBar, kind: str, values: Sequence[float]) -> Array:
     """
     assembly = int(values[0])
     theta = np.array(values[1:3])
+    if kind == "nearest":
+        return workspace.nearest(leg, theta)
     if kind == "forward":
         return kinematics.forward(leg, theta, assembly)
     if kind == "knees":
@@ -97,7 +103,9 @@ def _slack(leg: FiveBar, kind: str, values: Sequence[float]) -> float:
     """Return the sum of |slope| times the input's size, over all inputs, and the answer's own."""
     lengths = [getattr(leg, key) for key in KEYS]
     point = np.array([*lengths, *values[1:]])
-    sizes = np.array([*[leg.size] * 6, *[np.pi] * 4, *[abs(v) for v in values[3:]]])
+    # Two angles follow on bend and tilt, or the point.
+    unit = leg.size if kind == "nearest" else np.pi
+    sizes = np.array([*[leg.size] * 6, np.pi, np.pi, unit, unit, *[abs(v) for v in values[3:]]])
     total = np.abs(_at(leg, kind, values[0], point)).max()
 
     for k, size in enumerate(sizes):

@@ -29,6 +29,7 @@ NAMES = {
     "knees": ("B_x", "B_z", "D_x", "D_z"),
     "jacobian": ("dx/dA", "dx/dE", "dz/dA", "dz/dE"),
     "torque": ("tau_A", "tau_E"),
+    "nearest": ("x", "z"),
 }
 """The numbers of an answer."""
 
@@ -57,7 +58,12 @@ class Fault(NamedTuple):
 
 def not_refused(case: Case, numbers: tuple[float, ...]) -> str:
     """Return the kind of an answer that should have been a refusal."""
-    what = {"inverse": "out of reach", "jacobian": "singular or open", "torque": "singular or open"}
+    what = {
+        "inverse": "out of reach",
+        "jacobian": "singular or open",
+        "torque": "singular or open",
+        "nearest": "not finite",
+    }
     where = what.get(case.kind, "loop open")
     if any(map(math.isnan, numbers)):
         return f"{where}: not refused, answered NaN"
@@ -116,6 +122,8 @@ def kind(leg: FiveBar, case: Case, precision: str, numbers: tuple[float, ...]) -
 
 def _vectors(case: Case, expected: np.ndarray) -> Iterator[tuple[str, np.ndarray]]:
     """Yield the known ways in which points, Jacobians and torques go wrong."""
+    if case.kind == "nearest":
+        yield "the point itself, out of reach", np.array([*map(float.fromhex, case.inputs)])
     if not np.any(expected):
         return
     yield "wrong sign", -expected
@@ -128,7 +136,7 @@ def _vectors(case: Case, expected: np.ndarray) -> Iterator[tuple[str, np.ndarray
         yield "A and E exchanged", expected[::-1]
     if case.kind == "knees":
         yield "A and E exchanged", expected[[2, 3, 0, 1]]
-    if case.kind in ("forward", "knees"):
+    if case.kind in ("forward", "knees", "nearest"):
         flipped = expected.copy()
         flipped[1::2] *= -1.0
         yield "z downwards", flipped

@@ -19,7 +19,7 @@ REFUSALS = ("unreachable", "open", "singular", "refused")
 
 UNSUPPORTED = "unsupported"
 
-ANSWERS = {"inverse": 2, "forward": 2, "knees": 4, "jacobian": 4, "torque": 2}
+ANSWERS = {"inverse": 2, "forward": 2, "knees": 4, "jacobian": 4, "torque": 2, "nearest": 2}
 """The kinds of questions, and how many numbers answer one."""
 
 PRECISIONS = ("float32", "float64", "degrees", "firmware")

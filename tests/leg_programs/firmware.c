@@ -81,6 +81,8 @@ static void reply(fivebar_leg *leg, const char *kind, const fivebar_real *x)
         answer(status, found, 4);
     } else if (strcmp(kind, "torque") == 0) {
         answer(fivebar_torque(leg, x + 1, assembly, x + 3, found), found, 2);
+    } else if (strcmp(kind, "nearest") == 0) {
+        answer(fivebar_nearest(leg, x, found), found, 2);
     } else {
         puts("unsupported");
     }
