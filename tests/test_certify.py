@@ -222,6 +222,15 @@ def test_command_says_what_is_wrong_and_where(shell: Shell) -> None:
     assert last.endswith(": fail")
 
 
+def test_answer_of_many_digits_is_not_shown_in_full() -> None:
+    leg = LEGS[0]
+    case = next(each for each in leg.cases if not each.answer and each.kind == "inverse")
+    line = " ".join(["ok", "0" * 5000 + "1", "2"])
+    fault = judge.look(judge.geometry_of(leg), case, "float64", line)
+    assert fault is not None
+    assert len(fault.got) == judge.NUMBERS
+
+
 HELLO = "import sys; sys.stdout.write('float64\\n'); sys.stdout.flush()\n"
 BAD = {
     "silent": ("import time; time.sleep(60)", "had not ended after 0.3 s"),

@@ -22,6 +22,10 @@ LEAST = 1
 """Right answers without which nothing is certified: a program may not leave out everything."""
 
 
+NUMBERS = 200
+"""Most letters of an answer of numbers that are shown: enough for all of a Jacobian's."""
+
+
 class Report(NamedTuple):
     """What came of a program.
 
@@ -105,7 +109,7 @@ def _wrong(leg: Leg, precision: str, lines: Sequence[str]) -> list[Fault]:
             continue
         fault = look(geometry, case, precision, line)
         if fault is None and not bits.same(line, own):
-            fault = Fault("other bits than the firmware's", case, line, own=own)
+            fault = Fault("other bits than the firmware's", case, _short(line, NUMBERS), own=own)
         if fault is not None:
             found.append(fault)
     return found
@@ -148,7 +152,7 @@ def look(leg: FiveBar, case: Case, precision: str, line: str) -> Fault | None:
     if numbers is None:
         return Fault("not an answer", case, _short(line))
     if not case.answer:
-        return Fault(faults.not_refused(case, numbers), case, line)
+        return Fault(faults.not_refused(case, numbers), case, _short(line, NUMBERS))
 
     worst, beyond = faults.difference(case, precision, numbers)
     if beyond <= 0.0 and not faults.whole_turn(case, precision, numbers):
@@ -174,5 +178,5 @@ def _number(word: str) -> float:
     return float.fromhex(word) if "x" in word.lower() else float(word)
 
 
-def _short(text: str) -> str:
-    return text if len(text) <= 60 else f"{text[:57]}..."
+def _short(text: str, most: int = 60) -> str:
+    return text if len(text) <= most else f"{text[: most - 3]}..."
