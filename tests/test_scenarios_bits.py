@@ -17,7 +17,7 @@ from shipped import NAMES, shortened
 
 from fivebar_sim import rollout
 from fivebar_sim.files import resources
-from fivebar_sim.rollout import Result
+from fivebar_sim.rollout import Plan, Result
 from fivebar_sim.simulation import steps
 
 SCRIPTS = Path(__file__).parents[1] / "scripts"
@@ -25,9 +25,15 @@ WORKER = SCRIPTS / "determinism_runs.py"
 
 
 @pytest.fixture(scope="module")
-def alone() -> list[Result]:
-    """Every scenario by itself, in the order of their names."""
-    return [rollout.run(shortened(name)) for name in NAMES]
+def plans() -> list[Plan]:
+    """Every scenario's plan, in the order of their names."""
+    return [rollout.plan(shortened(name)) for name in NAMES]
+
+
+@pytest.fixture(scope="module")
+def alone(plans: list[Plan]) -> list[Result]:
+    """What comes of each by itself."""
+    return [rollout.execute(plan) for plan in plans]
 
 
 def same_bits(result: Result, other: Result) -> None:
@@ -37,9 +43,8 @@ def same_bits(result: Result, other: Result) -> None:
         np.testing.assert_array_equal(column, other.record[key], err_msg=key)
 
 
-def test_two_of_each_together_on_two_threads(alone: list[Result]) -> None:
-    plans = [each for name in reversed(NAMES) for each in [rollout.plan(shortened(name))] * 2]
-    together = rollout.run_all(plans, nthread=2)
+def test_two_of_each_together_on_two_threads(plans: list[Plan], alone: list[Result]) -> None:
+    together = rollout.run_all([plan for each in reversed(plans) for plan in (each, each)], 2)
     for i, result in enumerate(reversed(alone)):
         same_bits(together[2 * i], result)
         same_bits(together[2 * i + 1], result)
