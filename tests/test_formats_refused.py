@@ -87,6 +87,18 @@ CHANGES = {
         '<body name="rear_rod" pos="25 0 0"',
         "L1 must be in [0.001, 3] m, got 25: lengths are in metres; did you mean 0.025?",
     ),
+    "no length": (
+        "doggo.xml",
+        '<body name="shin_1" pos="0.004 0.09 0"',
+        '<body name="shin_1" pos="0.004 0 0"',
+        "the link between motor_1 and knee_1 must be longer than 0 m, got 0 m",
+    ),
+    "not finite": (
+        "infantry.xml",
+        '<body name="frame" pos="0 0.2 -0.02">',
+        '<body name="frame" pos="0 inf -0.02">',
+        "a number is not finite: body_pos of the compiled model",
+    ),
     "a beam": (
         "doggo.xml",
         "</equality>",

@@ -204,7 +204,11 @@ def _compiled(path: Path, compile_it: Any) -> mujoco.MjModel:
     """Return a compiled model; MuJoCo's messages span lines, ours are one line."""
     try:
         with quiet():
-            return compile_it()
+            model = compile_it()
     except ValueError as error:
         message = " ".join(str(error).split())
         raise ConfigError(f"{path}: MuJoCo cannot compile it: {message}") from None
+    for name in ("body_pos", "body_quat", "jnt_axis", "qpos0", "eq_data", "site_pos"):
+        if not np.isfinite(getattr(model, name)).all():
+            raise ConfigError(f"{path}: a number is not finite: {name} of the compiled model")
+    return model

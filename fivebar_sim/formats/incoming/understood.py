@@ -110,6 +110,7 @@ def understand(
     around = loop.find(read, motors, loop_name)
     plane = flat.find(read, around)
     posed = Posed(read, around, read.poses[0])
+    weigh.check_lengths(read, around, posed, plane)
     at = foot.find(read, around, posed, plane, foot_name)
 
     # At C the foot is on either link: then the motors' places decide.

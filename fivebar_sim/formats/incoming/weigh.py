@@ -7,7 +7,7 @@ import numpy as np
 from fivebar_sim.arrays import Array
 from fivebar_sim.errors import ConfigError
 from fivebar_sim.formats.incoming.flat import Plane, Posed
-from fivebar_sim.formats.incoming.loop import Loop
+from fivebar_sim.formats.incoming.loop import Loop, hinge_name
 from fivebar_sim.formats.incoming.source import Source
 from fivebar_sim.links import Link, combined
 
@@ -31,6 +31,23 @@ def ends(posed: Posed, plane: Plane, link: int) -> tuple[Array, Array]:
         posed.flat(plane, posed.hinge(inner, link)),
         posed.flat(plane, posed.hinge(outer, link)),
     )
+
+
+def check_lengths(source: Source, loop: Loop, posed: Posed, plane: Plane) -> None:
+    """Raise unless every link has two joints apart.
+
+    Raises:
+        ConfigError: The joints of a link are at one place.
+    """
+    for k, (one, other) in JOINTS.items():
+        inner, outer = ends(posed, plane, k)
+        length = float(np.hypot(*(outer - inner)))
+        if not length > 0.0:
+            between = " and ".join(hinge_name(source, loop, hinge) for hinge in (one, other))
+            raise ConfigError(
+                f"{source.path}: the link between {between} must be longer than 0 m, got "
+                f"{length:g} m"
+            )
 
 
 def in_link(at: Array, inner: Array, outer: Array) -> tuple[float, float]:
