@@ -86,6 +86,8 @@ def _trimmed(cells: Cells) -> Any:
     missing = compute.is_in(compute.utf8_lower(text), pyarrow.array(sorted(MISSING)))
     text = compute.if_else(missing, pyarrow.scalar(None, text.type), text)
     if cells.decimal == ",":
+        # A point is no number then: 1.234 may be a thousand.
+        text = compute.replace_substring(text, ".", "x")
         text = compute.replace_substring(text, ",", ".")
     return text
 
@@ -114,7 +116,7 @@ def _one_by_one(text: Any, cells: Cells) -> Array:
 
 
 CURES = (
-    (r"[+-]?\d+,\d+", "the file has decimal commas and points: use one of them in all of it"),
+    (r"[+-]?\d+[.,]\d+", "the file has decimal commas and points: use one of them in all of it"),
     (r"[+-]?\d{1,3}([.' ]\d{3})+([.,]\d+)?", "write numbers without signs between thousands"),
     (r"0x[0-9a-fA-F]+", "write numbers in decimals"),
     (r"[+-]?[\d.]+(e[+-]?\d+)?\s*\D+", "write the unit in the header, not behind the numbers"),

@@ -41,6 +41,8 @@ def open_file(source: Source, where: str, head: bytes) -> Raw:
     lines = sample.splitlines()
     whole = len(lines) == 1 or len(head) < 1 << 16
     lines = (lines if whole else lines[:-1])[:LINES]
+    if not any(line.strip() for line in lines):
+        raise ConfigError(f"{where} is empty: a log needs a header and rows")
     if sum(PRINTED.match(line) is not None for line in lines) > len(lines) // 2:
         raise ConfigError(
             f"{where}: each line begins with the serial monitor's clock and '-> ': switch "
