@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import Any, Literal, Self
 
 import msgspec
-import numpy as np
 from numpy.typing import ArrayLike
 
 from fivebar_sim import logs
@@ -83,6 +82,11 @@ class Angles(FootPath, frozen=True, tag="angles", dict=True):
         return float(time[-1] - time[0])
 
     @property
+    def jumps(self) -> bool:
+        """Whether the target jumps from row to row."""
+        return self.interpolation == "hold"
+
+    @property
     def spline(self) -> Spline:
         """The angles over time [rad]."""
         kept = vars(self)
@@ -136,12 +140,4 @@ def _pieces(time: Array, theta: Array, interpolation: str) -> Spline:
     """Return angles between rows: a spline, straight lines, or each row until the next."""
     if interpolation == "cubic":
         return Spline.through(time, theta)
-    slope = np.diff(theta, axis=0) / np.diff(time)[:, np.newaxis]
-    none = np.zeros_like(slope)
-    if interpolation == "linear":
-        return Spline(time, np.stack([theta[:-1], slope, none, none]))
-
-    # The last row begins a piece too, or it would never be reached.
-    knots = np.append(time, 2.0 * time[-1] - time[-2])
-    still = np.zeros_like(theta)
-    return Spline(knots, np.stack([theta, still, still, still]))
+    return Spline.straight(time, theta) if interpolation == "linear" else Spline.steps(time, theta)
