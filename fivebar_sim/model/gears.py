@@ -151,6 +151,7 @@ class _Motors(NamedTuple):
             np.where(model.actuator_forcelimited[own], model.actuator_forcerange[own, 1], np.inf)
             for model in models
         ]
+
         discrete = mujoco.mjtIntegrator.mjINT_DISCRETE
         return cls(
             np.array([model.actuator_gainprm[own, 0] for model in models]),
@@ -245,6 +246,7 @@ def rubbed(
     wanted = tuple(dict.fromkeys([*record, *RECORDED, "sensordata"]))
     friction = batch.expand("dof_frictionloss")
     out: dict[Any, Array] = {}
+
     for k in range(ctrl.shape[1]):
         q = batch.qpos.copy()
         v = batch.qvel.copy()
