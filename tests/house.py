@@ -32,7 +32,7 @@ LEVELS = (
     "runs environment gym",
     "report",
     "page rollout vector",
-    "overlay regression sb3 sweep",
+    "identify overlay regression sb3 sweep",
     "design",
     "cli pytest_plugin",
     "fivebar_sim __main__",
