@@ -27,6 +27,7 @@ COMMANDS = {
     "check": "Check scenarios against limits, guards and recorded baselines.",
     "converge": "Show which metrics a scenario's timestep already gets right.",
     "sweep": "Simulate a scenario for all values of some of its keys.",
+    "identify": "Find the numbers of a real leg and its servos from logs.",
     "design": "Search which leg should be built for a task, and certify the best.",
     "replay": "Open the recordings of runs in the Rerun viewer, on this machine.",
     "report": "Explain a run, or compare several, on one self-contained HTML page.",
