@@ -143,9 +143,10 @@ int fivebar_reaches(const fivebar_leg *leg, const fivebar_real foot[2], int s_A)
 /* The reachable point that is nearest to a point [m]; a reachable one is returned as it is. What it
  * returns is reached in at least one working mode. Its distance to the point is the least one to
  * 1e-6 of the leg's size and L5. Without an extension that takes some square roots; with one (L6 > 0)
- * up to four coupler curves are walked along, in 150 to 300 steps of about 100 operations, and of a
- * second minimum between two steps the farther one may be taken. FIVEBAR_OUT_OF_LIMITS beyond
- * 10^6 m, FIVEBAR_UNREACHABLE if the leg reaches nothing at all. */
+ * up to four coupler curves are walked along, in 150 to 300 steps of about 100 operations. Where A, B,
+ * C and E can lie in one line, two of the curves' branches cross, and of a point whose nearest one is
+ * just there the distance may be more by 1e-3. FIVEBAR_OUT_OF_LIMITS beyond 10^6 m,
+ * FIVEBAR_UNREACHABLE if the leg reaches nothing at all. */
 int fivebar_nearest(const fivebar_leg *leg, const fivebar_real foot[2], fivebar_real nearest[2]);
 
 /* A third motor that turns the leg plane. Body frame: origin on the hip's axis, x forward, y left,
