@@ -11,6 +11,7 @@ A ---- L5 ---- E      A, E driven; theta_A, theta_E anticlockwise from +x of the
 
 from __future__ import annotations
 
+import importlib
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
@@ -250,6 +251,11 @@ class FiveBar:
             if getattr(self, field.name) != field.default
         ]
         return f"FiveBar({', '.join(own)})"
+
+    def _repr_html_(self) -> str:
+        """Return what a notebook shows: the leg over its workspace, its lengths and its mass."""
+        # By name: what draws stands above this room.
+        return importlib.import_module("fivebar_sim.report.notebook").leg(self)
 
     @classmethod
     def from_table(cls, table: Mapping[str, Any], where: str) -> FiveBar:

@@ -18,6 +18,8 @@ from fivebar_sim.control.servo import Servo
 from fivebar_sim.errors import ArgumentError, ConfigError, RunDirectoryError
 from fivebar_sim.files import resources
 from fivebar_sim.paths import Ellipse, Gait, Hop
+from fivebar_sim.regression import comparison
+from fivebar_sim.render import leg_lines
 from fivebar_sim.report import look, notebook
 from fivebar_sim.report.draw import Drawn
 from fivebar_sim.scenario.forces import Constant
@@ -87,6 +89,56 @@ def test_belt_and_limits_are_filled_in_as_in_a_file() -> None:
     assert isinstance(built.scene, Treadmill)
     assert built.scene.speed == GAIT.stance_speed
     assert built.limits == {"tracking.rms": (-np.inf, 1e-3), "load.share_A": (0.4, 0.6)}
+
+
+def test_repr_of_a_scenario_makes_the_scenario() -> None:
+    names: dict[str, Any] = {"Scenario": Scenario, "FiveBar": FiveBar, "inf": np.inf}
+    names |= {"Ellipse": Ellipse, "Gait": Gait, "Treadmill": Treadmill, "Servo": Servo}
+    assert repr(Scenario(leg=FiveBar(), path=GAIT)) == f"Scenario(leg=FiveBar(), path={GAIT!r})"
+    built = Scenario(leg=FiveBar(), path=ELLIPSE, servo=Servo(kp=4.0), duration=2.0)
+    for each in (built, Scenario.load("classic-ellipse")):
+        assert eval(repr(each), names) == each
+        assert len(repr(each)) < 500
+
+
+def test_html_of_a_leg_has_its_picture_and_its_numbers() -> None:
+    for preset in sorted(resources.shipped("models/legs")):
+        leg = FiveBar.load(preset)
+        page = leg._repr_html_()
+        # The chain of E ends at C, that of A at the foot where it is farther.
+        chains = [d for d in re.findall(r'stroke-linecap="round" d="M([^"]*)"', page)]
+        assert [d.count("L") for d in chains] == [2 + (leg.L6 > 0.0), 2]
+        numbers = [
+            float(x) for d in re.findall(r' d="M([^"]*)"', page) for x in re.split("[L ]", d)
+        ]
+        width, height = map(float, re.findall(r'viewBox="0 0 (\S+) (\S+)"', page)[0])
+        assert min(numbers) >= 0.0
+        assert max(numbers) <= max(width, height)
+        rows = dict(re.findall(r"<tr><td>(.*?)</td><td>(.*?)</td></tr>", page))
+        assert ("L6" in rows) == (leg.L6 > 0.0)
+    assert "<td>L1</td><td>40 mm</td>" in FiveBar()._repr_html_()
+
+
+def test_html_of_a_scenario_has_its_path_and_limits_with_units() -> None:
+    shown = Scenario.load("classic-ellipse", ["name=a&b", "leg.L2=0.065", "limits={}"])
+    limits: Any = {"tracking.rms": 1.3e-3, "load.share_A": (0.4, 0.6)}
+    page = msgspec.structs.replace(shown, limits=limits)._repr_html_()
+    assert "<p>a&amp;b: classic leg, L2 = 65 mm</p>" in page
+    rows = dict(re.findall(r"<tr><td>(.*?)</td><td>(.*?)</td></tr>", page))
+    assert rows["path"] == "ellipse"
+    assert rows["limit: tracking RMS"] == "&lt;= 1.3 mm"
+    assert rows["limit: load share A"] == "40 to 60 %"
+    assert page.count("<path") == len(leg_lines.edges(shown.leg)) + 1 + 2
+    # A robot's is that of one of its legs.
+    assert "robot q8bot" in Scenario.load("robot-q8bot-trot")._repr_html_()
+
+
+def test_html_of_a_comparison_is_the_table_of_ci(result: Result) -> None:
+    page = comparison.compare(result, None)._repr_html_()
+    assert "<p>a&amp;b: " in page
+    (row,) = re.findall(r"<tr><td>tracking max</td>(.*?)</tr>", page)
+    assert row.endswith("<td>FAIL</td>")
+    assert "<td>&lt;= 1 nm</td>" in row
 
 
 def test_html_has_verdict_metrics_and_leg(result: Result, monkeypatch: pytest.MonkeyPatch) -> None:

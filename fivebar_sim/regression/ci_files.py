@@ -7,8 +7,6 @@ import re
 from collections.abc import Iterator, Sequence
 from xml.etree import ElementTree
 
-from fivebar_sim.metrics.catalogue import SHOWN, shown
-from fivebar_sim.metrics.limits import bounds
 from fivebar_sim.metrics.measured import NOT_JUDGED
 from fivebar_sim.regression.comparison import BETTER, FAIL, Checked, Compared
 
@@ -107,11 +105,8 @@ def _table(checked: Sequence[Checked]) -> Iterator[str]:
 
 def _cells(row: Compared) -> list[str]:
     """Return the cells of one metric's row."""
-    limit = bounds(row.limit) if row.limit else ""
-    then = shown(row.key, row.recorded.value) if row.recorded else ""
-    cells = [SHOWN[row.key][0], limit, then, shown(row.key, row.now), row.change]
     verdict = f"**{row.verdict}**" if row.verdict in (FAIL, BETTER) else row.verdict
-    return [*map(html.escape, cells), verdict]
+    return [*map(html.escape, row.cells), verdict]
 
 
 def _md(text: str) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import html
 from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -45,6 +46,13 @@ class Compared(NamedTuple):
             return ""
         return _change(self.recorded.value, self.now, self.key)
 
+    @property
+    def cells(self) -> tuple[str, str, str, str, str]:
+        """Name, limit, baseline, value and change in the units that people read."""
+        limit = bounds(self.limit) if self.limit else ""
+        then = shown(self.key, self.recorded.value) if self.recorded else ""
+        return SHOWN[self.key][0], limit, then, shown(self.key, self.now), self.change
+
 
 class Checked(NamedTuple):
     """The result of checking one scenario.
@@ -79,6 +87,15 @@ class Checked(NamedTuple):
         better = [SHOWN[row.key][0] for row in self.rows if row.verdict == BETTER]
         line = f"better than its baseline: {', '.join(better)}; --update records it"
         return [line, *self.notes] if better else self.notes
+
+    def _repr_html_(self) -> str:
+        """Return what a notebook shows: every metric beside its limit and its baseline."""
+        from fivebar_sim.report import notebook
+
+        said = html.escape("; ".join([*self.failures, *self.remarks]) or PASS)
+        head = ("metric", "limit", "baseline", "now", "change", "verdict")
+        rows = [(*row.cells, row.verdict) for row in self.rows]
+        return f"<div><p>{html.escape(self.name)}: {said}</p>{notebook.table(head, rows)}</div>"
 
 
 def compare(result: Result, baseline: Baseline | None, remarks: Sequence[str] = ()) -> Checked:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import math
 from collections.abc import Iterable
 from dataclasses import asdict
@@ -90,6 +91,25 @@ class Scenario(msgspec.Struct, frozen=True, kw_only=True):
         msgspec.structs.force_setattr(self, "scene", scene)
         together.check_window(self)
         together.check_scene(self)
+
+    def __repr__(self) -> str:
+        """Return what differs from the defaults; Python makes the same scenario of it."""
+        own: list[str] = []
+        for field in msgspec.structs.fields(self):
+            value = getattr(self, field.name)
+            if field.name == "controller_name":
+                usual = name_of(self.controller)
+            else:
+                make = field.default_factory
+                usual = field.default if make is msgspec.NODEFAULT else make()
+            if value != usual:
+                own.append(f"{field.name}={value!r}")
+        return f"{type(self).__name__}({', '.join(own)})"
+
+    def _repr_html_(self) -> str:
+        """Return what a notebook shows: the leg over its path, what is run, and the limits."""
+        # By name: what draws stands above this room.
+        return importlib.import_module("fivebar_sim.report.notebook").scenario(self)
 
     @property
     def words(self) -> str:

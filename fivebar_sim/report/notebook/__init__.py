@@ -1,5 +1,6 @@
-"""A run in a notebook."""
+"""What a notebook shows of a leg, a scenario, a run, and a run held against its baseline."""
 
-from fivebar_sim.report.notebook.show import PLOTS, fragment, plot
+from fivebar_sim.report.notebook.legs import leg, scenario
+from fivebar_sim.report.notebook.show import PLOTS, fragment, plot, table
 
-__all__ = ["PLOTS", "fragment", "plot"]
+__all__ = ["PLOTS", "fragment", "leg", "plot", "scenario", "table"]

@@ -84,7 +84,7 @@ def fragment(run: StoredRun) -> str:
         )
         for row in side_by_side(run.metrics, limits)
     ]
-    parts.append(_table(("metric", "window", "whole run", "limit", "verdict"), rows))
+    parts.append(table(("metric", "window", "whole run", "limit", "verdict"), rows))
     if not recorded.all_of_robots([run]):
         with look.project_style():
             picture = look.png(in_plane.leg_moments(run).figure)
@@ -94,7 +94,8 @@ def fragment(run: StoredRun) -> str:
     return f"<div>{''.join(parts)}</div>"
 
 
-def _table(head: tuple[str, ...], rows: list[tuple[str, ...]]) -> str:
+def table(head: tuple[str, ...], rows: list[tuple[str, ...]]) -> str:
+    """Return a table of texts as HTML."""
     heads = "".join(f"<th>{html.escape(cell)}</th>" for cell in head)
     lines = ["".join(f"<td>{html.escape(cell)}</td>" for cell in row) for row in rows]
     body = "".join(f"<tr>{line}</tr>" for line in lines)
