@@ -116,7 +116,9 @@ def test_incomplete_run_is_none(tmp_path: Path, result: Result, missing: str) ->
     assert not directory.is_run(where)
     with pytest.raises(RunDirectoryError) as caught:
         directory.check_run(where)
-    assert str(caught.value) == f"{where} is not a run directory: it lacks {missing}"
+    again = f"; `fivebar run {where}/scenario.toml --out DIR` makes it again, in another place"
+    hint = "" if missing == "scenario.toml" else again
+    assert str(caught.value) == f"{where} is not a run directory: it lacks {missing}{hint}"
     with pytest.raises(RunDirectoryError, match=r"no such directory$"):
         directory.check_run(tmp_path / "nowhere")
 

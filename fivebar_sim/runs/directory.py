@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import errno
 import json
+import shlex
 import shutil
 import tempfile
 from collections.abc import Iterable, Mapping
@@ -24,6 +25,7 @@ from fivebar_sim.runs.kept import DIVERGED, FILES, keep, own_names
 from fivebar_sim.scenario.run import Run
 
 RECORDING = "recording.rrd"
+SCENARIO = "scenario.toml"
 
 TABLES = ("leg", "path", "force", "scene", "servo", "controller", "sensors", "sim")
 """Tables of a scenario whose keys have units; each is an attribute of it."""
@@ -163,6 +165,9 @@ def check_run(path: Path) -> None:
     missing = [name for name in FILES if not (path / name).is_file()]
     if missing:
         what = f"it lacks {', '.join(missing)}" if path.is_dir() else "no such directory"
+        if path.is_dir() and SCENARIO not in missing:
+            again = shlex.join(["fivebar", "run", str(path / SCENARIO), "--out"])
+            what += f"; `{again} DIR` makes it again, in another place"
         raise RunDirectoryError(f"{path} is not a run directory: {what}")
 
 
