@@ -120,9 +120,9 @@ def test_margin_keeps_away_from_the_boundary(leg: FiveBar) -> None:
 def test_short_extension_is_almost_none(L6: float) -> None:
     """F is within L6 of C, so the region is within L6 of the rings', and its outside too."""
     rng = np.random.default_rng(9)
-    for _ in range(3):
+    for _ in range(2):
         leg = replace(any_leg(rng), L6=L6)
-        p = around(leg, rng, 100)
+        p = around(leg, rng, 50)
         exact = workspace.distance(replace(leg, L6=0.0), p)
         atol = 3.0 * L6 + 1e-14 * leg.size
         np.testing.assert_allclose(workspace.distance(leg, p), exact, rtol=0, atol=atol)
@@ -156,8 +156,8 @@ def test_coaxial_leg_has_circles() -> None:
         (0.5 * (left[1] + right[0]), 0.5 * (left[1] - right[0])),
         (right[1] + 0.1, -0.1),
     ):
-        for angle in np.linspace(0.0, 6.0, 20):
-            assert workspace.distance(leg, r * unit(angle)) == pytest.approx(d, abs=1e-15)
+        around_it = workspace.distance(leg, r * unit(np.linspace(0.0, 6.0, 20)))
+        np.testing.assert_allclose(around_it, d, rtol=0, atol=1e-15)
 
 
 def test_minitaur_reaches_a_whole_ring() -> None:
