@@ -145,7 +145,8 @@ def test_a_leg_that_float_cannot_hold_is_refused(
 def test_nothing_to_export_is_one_line(shell: Shell) -> None:
     said = shell("export", "classic")
     assert said.status == 2
-    assert said.err == "fivebar: say what to export: --c DIR or --table FILE\n"
+    options = "--mjcf FILE, --urdf FILE, --c DIR or --table FILE"
+    assert said.err == f"fivebar: say what to export: {options}\n"
 
 
 def test_names_cannot_break_the_source() -> None:
