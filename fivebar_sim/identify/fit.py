@@ -253,11 +253,20 @@ def newey_west(J: Array, channels: Sequence[Array], logs: Sequence[Measured]) ->
             middle += (1.0 - k / (own + 1.0)) * (product + product.T)
 
     free = len(r) / max(len(r) - J.shape[1], 1)
-    return free * inverse @ middle @ inverse
+    lasting = free * inverse @ middle @ inverse
+    white = free * float(r @ r) / len(r) * np.diag(inverse)
+    # Of residuals that are white after all the estimate scatters: it must not be the surer one.
+    wider = np.sqrt(np.maximum(white / np.maximum(np.diag(lasting), 1e-300), 1.0))
+    return lasting * np.outer(wider, wider)
 
 
 def _lasting(r: Array, most: int) -> int:
-    """Return over how many samples residuals hang together: 3 times the first lag where not."""
+    """Return over how many samples residuals hang together: 3 times the first lag where not.
+
+    Args:
+        r: Residuals of one motor in one log.
+        most: The longest.
+    """
     centred = r - r.mean()
     power = float(centred @ centred)
     if power == 0.0:
@@ -265,7 +274,7 @@ def _lasting(r: Array, most: int) -> int:
     small = 2.0 / np.sqrt(len(r))
     for k in range(1, most):
         if abs(float(centred[:-k] @ centred[k:])) / power < small:
-            return min(3 * k + 5, most)
+            return min(3 * k, most)
     return most
 
 
