@@ -143,6 +143,13 @@ def test_logs_that_cannot_be_laid_over_a_leg_are_refused() -> None:
     still = {name: np.full_like(values, values[0]) for name, values in log.channels.items()}
     with pytest.raises(ConfigError, match="angles hardly move"):
         compare(result.scenario, log._replace(channels=still))
+    with pytest.raises(ConfigError, match="overlap in 0 rows"):
+        align.delay(
+            log.time[:0],
+            log.pair("theta")[:0],
+            align.hermite(log.time, *2 * [log.pair("theta")]),
+            0.1,
+        )
     with pytest.raises(ConfigError, match="must last more than that"):
         align.anywhere(
             log.time,

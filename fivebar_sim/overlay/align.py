@@ -31,8 +31,6 @@ def delay(time: Array, theta: Array, run: Spline, most: float) -> float:
     Raises:
         ConfigError: The angles hardly move, or the log and the run hardly overlap.
     """
-    if not (np.std(theta, axis=0) > STILL).any():
-        raise ConfigError("the log's angles hardly move: there is nothing to align in time")
     begin = float(run.knots[0])
     end = float(run.knots[-1])
     # The same rows for all delays, or each would be measured by another yardstick.
@@ -42,6 +40,8 @@ def delay(time: Array, theta: Array, run: Spline, most: float) -> float:
             f"the log and the run overlap in {int(inside.sum())} rows, at most {most:g} s of delay "
             "left out at both ends: at least 10 are needed"
         )
+    if not (np.std(theta, axis=0) > STILL).any():
+        raise ConfigError("the log's angles hardly move: there is nothing to align in time")
     t = time[inside]
     own = theta[inside] - theta[inside].mean(axis=0)
 
