@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 import importlib.util
 import xml.etree.ElementTree as ET
 from pathlib import Path
@@ -131,6 +132,15 @@ def test_command(shell: Shell) -> None:
     Path("mine.toml").write_text("L1 = 0.05\nL2 = 0.07\n")
     assert shell("export", "mine.toml", "--urdf", "mine.urdf").status == 0
     assert ET.parse("mine.urdf").getroot().get("name") == "mine"
+
+
+def test_a_library_that_rounds_is_refused_in_one_line(
+    shell: Shell, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(ctypes, "CDLL", lambda path: ctypes.pythonapi)
+    said = shell.refused("export", "classic", "--mjcf", "x.xml")
+    assert "cannot write numbers with every digit" in said
+    assert "x.xml" not in shell.names()
 
 
 def test_refusals(shell: Shell) -> None:

@@ -10,6 +10,8 @@ from pathlib import Path
 
 import mujoco
 
+from fivebar_sim.errors import ConfigError
+
 MOST = 17
 """Digits with which every float64 reads back as itself."""
 
@@ -34,12 +36,19 @@ def every_digit() -> Iterator[None]:
 def _setter() -> ctypes._NamedFuncPointer:
     """Return the function of MuJoCo's library that sets how many digits it writes.
 
-    Python's bindings leave it out. Whoever writes a file reads it back and compares, so that a
-    library without it would not go unnoticed.
+    Python's bindings leave it out. Whoever writes a file reads it back and compares.
+
+    Raises:
+        ConfigError: A library without it.
     """
     folder = Path(mujoco.__file__).parent
     library = next(folder.glob("libmujoco*"), folder / "mujoco.dll")
-    return ctypes.CDLL(str(library))["_mjPRIVATE__set_xml_precision"]
+    try:
+        return ctypes.CDLL(str(library))["_mjPRIVATE__set_xml_precision"]
+    except (AttributeError, OSError):
+        raise ConfigError(
+            f"this version of MuJoCo, {mujoco.__version__}, cannot write numbers with every digit"
+        ) from None
 
 
 def shortest(value: str) -> str:
