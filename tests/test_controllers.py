@@ -219,7 +219,8 @@ def test_angles_that_cannot_close_are_far() -> None:
     near = Pd(kp=law.kp_near, kd=law.kd_near)
     np.testing.assert_array_equal(tau[0, 0], ask(far, RIGHT, seen, wanted)[0, 0])
     np.testing.assert_array_equal(tau[0, 1], ask(near, RIGHT, seen, wanted)[0, 1])
-    assert np.all((far.kp * 0.2 < tau[1, 1]) & (tau[1, 1] < near.kp * 0.2))
+    between = (law.kp_far * 0.2, law.kp_near * 0.2)
+    assert np.all((between[0] < tau[1, 1]) & (tau[1, 1] < between[1]))
     one = seen._replace(theta=theta[1, 1], theta_dot=np.zeros(2))
     alone = at_rest(RIGHT, theta[1, 1] + 0.2, foot=wanted.foot)[1]
     np.testing.assert_array_equal(tau[1, 1], ask(law, RIGHT, one, alone))

@@ -102,7 +102,7 @@ def motions(task: Task, row: Array) -> list[dict[str, Array]]:
         omega = moving.q_dot[:, [0, 2]]
         model = dynamics.LegDynamics(leg, payload=motion.payload)
         alpha = moving.q_ddot[:, [0, 2]]
-        torque = model.inverse(theta, omega, alpha, force, friction=servo.friction)
+        torque = model.inverse(theta, omega, alpha, force, friction=servo.dry)
         done.append({"theta": theta, "omega": omega, "torque": torque, "foot": foot.position})
     return done
 

@@ -56,7 +56,8 @@ def test_setpoints_come_at_every_step_to_the_servo_of_the_design(task: Task) -> 
     (case,) = cases(task, DESIGNS[0])
     servo = case.scenario.servo
     assert (servo.rate, servo.delay, servo.resolution) == (None, 0.0, 0.0)
-    assert servo.friction == task.servos[0].friction > 0.0
+    assert servo.friction == task.servos[0].friction
+    assert servo.dry > 0.0
     assert case.scenario.leg == task.leg_of(DESIGNS[0])
     period = case.scenario.path.period
     assert period is not None

@@ -80,8 +80,10 @@ def test_what_may_not_fall_either_is_known() -> None:
         "load.thermal_share_A",
         "load.torque_rms.A",
         "load.torque_rms.E",
+        "robot.agility",
         "robot.body_lengths_per_second",
         "robot.drift",
+        "robot.jump_height",
         "robot.speed",
         "robot.turn_rate",
     ]

@@ -20,7 +20,7 @@ from fivebar_sim import rollout
 from fivebar_sim.cli import memory, terminal
 from fivebar_sim.files import input_file, resources
 from fivebar_sim.runs import directory, recording_file
-from fivebar_sim.scenario import scenario
+from fivebar_sim.scenario import together
 
 resource = pytest.importorskip("resource", reason="this system limits no process")
 
@@ -114,7 +114,7 @@ def test_a_run_without_end_is_refused(shell: Shell, settings: list[str]) -> None
     pairs = [part for setting in settings for part in ("--set", setting)]
     for command in ("run", "check"):
         said = shell.refused(command, "short.toml", *pairs)
-        assert f"duration must be 2 to {scenario.MOST_STEPS} timesteps of" in said
+        assert f"duration must be 2 to {together.MOST_STEPS} timesteps of" in said
 
 
 # files

@@ -14,7 +14,11 @@ if TYPE_CHECKING:
     from fivebar_sim.certify.faults import Fault
     from fivebar_sim.certify.judge import Report
 
-UNITS = {"inverse": "rad", "forward": "m", "knees": "m", "jacobian": "m/rad", "torque": "N m"}
+UNITS = {
+    **dict.fromkeys(("forward", "knees", "nearest"), "m"),
+    **{"inverse": "rad", "jacobian": "m/rad", "torque": "N m"},
+}
+"""Of the numbers of an answer."""
 
 EXAMPLES = 2
 """Faults of each kind that are shown."""

@@ -170,6 +170,7 @@ def check_sine(sine: Array, where: str) -> None:
     Raises:
         SingularError: At one pose at least; `.index` is the first.
     """
+    sine = np.asarray(sine)
     # Written so that NaN is singular too.
     singular = ~(np.abs(sine) > SINGULAR)
     if singular.any():
