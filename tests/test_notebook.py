@@ -184,7 +184,10 @@ def test_library_that_is_missing_is_named(result: Result, monkeypatch: pytest.Mo
 def test_every_plot_is_a_figure_of_the_report(
     result: Result, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    assert isinstance(result.plot("torque-speed"), Figure)
+    drawn = result.plot("torque-speed")
+    assert isinstance(drawn, Figure)
+    # What IPython asks for.
+    assert vars(drawn)["_repr_png_"]().startswith(b"\x89PNG")
     figure = Figure()
     for name in notebook.PLOTS:
         monkeypatch.setitem(notebook.PLOTS, name, lambda run: Drawn("x", "", "", "", figure))

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import base64
 import html
+import io
 from collections.abc import Callable
+from functools import partial
 from typing import TYPE_CHECKING
 
 from fivebar_sim.errors import ArgumentError, unknown
@@ -42,6 +44,9 @@ WORDS = {True: "pass", False: "FAIL"}
 
 ASIDE = "#8a6d00"
 
+DPI = 90
+"""Pixels per inch of a plot in a notebook."""
+
 
 def plot(run: StoredRun, name: str) -> Figure:
     """Return a figure of a leg's run.
@@ -62,7 +67,17 @@ def plot(run: StoredRun, name: str) -> Figure:
         drawn = PLOTS[name](run)
     if drawn is None:
         raise ArgumentError(f"{name!r} has nothing to draw in {run.scenario.name}")
+    # Of other figures IPython shows but the name, unless it was told %matplotlib inline.
+    vars(drawn.figure)["_repr_png_"] = partial(_png, drawn.figure)
     return drawn.figure
+
+
+def _png(figure: Figure) -> bytes:
+    """Return a figure as a PNG."""
+    out = io.BytesIO()
+    with look.project_style():
+        figure.savefig(out, format="png", dpi=DPI)
+    return out.getvalue()
 
 
 def fragment(run: StoredRun) -> str:
