@@ -279,6 +279,8 @@ def test_light_and_dark(classic: Sight) -> None:
     light = classic.page.evaluate(seen)
     assert light == ["rgb(255, 255, 255)", "255,255,255,255"]
     classic.page.emulate_media(color_scheme="dark")
+    # The browser tells the page of it before it draws its next frame, and that may come late.
+    classic.page.evaluate("new Promise(next => requestAnimationFrame(next))")
     classic.settle()
     dark = classic.page.evaluate(seen)
     assert dark == ["rgb(21, 24, 29)", "21,24,29,255"]
