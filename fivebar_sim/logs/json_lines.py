@@ -60,7 +60,7 @@ def _row(line: bytes, where: str, number: int) -> dict[str, Any]:
         return {}
     try:
         value = msgspec.json.decode(bare)
-    except (msgspec.DecodeError, RecursionError) as error:
+    except (msgspec.DecodeError, RecursionError, UnicodeDecodeError) as error:
         raise ConfigError(f"{where}, line {number}: not JSON: {error}") from None
     if not isinstance(value, dict):
         raise ConfigError(f"{where}, line {number}: must be an object, got {bare[:40]!r}")

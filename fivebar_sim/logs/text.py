@@ -134,6 +134,11 @@ def _by_arrow(
         except pyarrow.ArrowInvalid as error:
             message = " ".join(str(error).split())
             raise ConfigError(f"{where} cannot be read as {told.words}: {message:.120}") from None
+        except UnicodeDecodeError as error:
+            raise ConfigError(
+                f"{where} is no text: byte 0x{error.object[error.start]:02x} is neither UTF-8 nor "
+                f"{encoding}"
+            ) from None
     _say_bad(where, len(names), [came for came, _ in bad], count, remarks)
 
 
