@@ -105,16 +105,16 @@ def _cell(value: Any, *, text: bool) -> Any:
 
 def _messages(source: Source, where: str) -> Iterator[tuple[str, str, bytes, int]]:
     """Yield topic, encoding, data and time of each message, in the order of time."""
-    from mcap.exceptions import McapError
-
     try:
         with stream(source) as file:
             for _, channel, message in _reader(file).iter_messages():
                 yield channel.topic, channel.message_encoding, message.data, message.log_time
-    except (McapError, EOFError, ValueError) as error:
-        if isinstance(error, ConfigError):
-            raise
-        raise ConfigError(f"{where} is damaged: {error}: try `mcap recover`") from None
+    except ConfigError:
+        raise
+    # Damaged bytes end in errors of any kind, of the library and of those that decompress for it.
+    except Exception as error:
+        said = f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
+        raise ConfigError(f"{where} is damaged: {said:.120}: try `mcap recover`") from None
 
 
 def _reader(file: BinaryIO) -> McapReader:
@@ -127,7 +127,7 @@ def _fields(topic: str, data: bytes, where: str) -> dict[str, Any]:
     """Return the fields of a message by "TOPIC.FIELD"."""
     try:
         value = msgspec.json.decode(data)
-    except (msgspec.DecodeError, RecursionError) as error:
+    except (msgspec.DecodeError, RecursionError, UnicodeDecodeError) as error:
         raise ConfigError(f"{where}: a message of {topic} is not JSON: {error}") from None
     name = topic.strip("/")
     return {f"{name}.{key}" if key else name: part for key, part in flat(value)}
