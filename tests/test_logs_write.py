@@ -2,33 +2,17 @@
 
 from __future__ import annotations
 
-import functools
 from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
 import pytest
+from logged_runs import SENSORS, log_of, ran
 
-from fivebar_sim import Scenario, run
+from fivebar_sim import Scenario
 from fivebar_sim.errors import ConfigError
-from fivebar_sim.logs import Log, load
+from fivebar_sim.logs import load
 from fivebar_sim.overlay import measured, write
-from fivebar_sim.rollout import Result
-
-SENSORS = ("sensors.noise=0.001", "sensors.rate_noise=0.01", "sensors.resolution=0.0015339808")
-SERVO = ("servo.rate=200", "servo.delay=0.002", "servo.kt=0.5", "servo.resistance=3.0")
-SHORT = ("duration=1.2", "path.ramp=0.25", "limits={}")
-
-
-@functools.cache
-def ran(*settings: str) -> Result:
-    return run(Scenario.load("classic-ellipse", [*SHORT, *SERVO, *settings]))
-
-
-def log_of(result: Result, *sensors: str) -> Log:
-    """The log of a run with other sensors, which only see it."""
-    seen = Scenario.load("classic-ellipse", [*SHORT, *SERVO, *sensors])
-    return measured.log_of(seen, result.record)
 
 
 @pytest.mark.parametrize(

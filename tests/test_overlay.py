@@ -2,36 +2,20 @@
 
 from __future__ import annotations
 
-import functools
 import json
 from pathlib import Path
 
 import numpy as np
 import pytest
+from logged_runs import SENSORS, SERVO, SHORT, log_of, ran
 
-from fivebar_sim import Scenario, run
+from fivebar_sim import run
 from fivebar_sim.cli import main
 from fivebar_sim.errors import ConfigError, LoopOpenError
 from fivebar_sim.logs import Log
-from fivebar_sim.overlay import align, measured, page, write
+from fivebar_sim.overlay import align, page, write
 from fivebar_sim.overlay.compare import KEYS, Channel, compare
 from fivebar_sim.overlay.play import played
-from fivebar_sim.rollout import Result
-
-SENSORS = ("sensors.noise=0.001", "sensors.rate_noise=0.01", "sensors.resolution=0.0015339808")
-SERVO = ("servo.rate=200", "servo.delay=0.002", "servo.kt=0.5", "servo.resistance=3.0")
-SHORT = ("duration=1.2", "path.ramp=0.25", "limits={}")
-
-
-@functools.cache
-def ran(*settings: str) -> Result:
-    return run(Scenario.load("classic-ellipse", [*SHORT, *SERVO, *settings]))
-
-
-def log_of(result: Result, *sensors: str) -> Log:
-    """The log of a run with other sensors, which only see it."""
-    seen = Scenario.load("classic-ellipse", [*SHORT, *SERVO, *sensors])
-    return measured.log_of(seen, result.record)
 
 
 def without(log: Log, *names: str) -> Log:
