@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from pathlib import Path
 from typing import NamedTuple
 
@@ -14,7 +15,8 @@ from fivebar_sim.arrays import Array
 from fivebar_sim.control.servo import Servo
 from fivebar_sim.errors import ConfigError
 from fivebar_sim.identify import findings, motions, written
-from fivebar_sim.identify.fit import Fit, fit, newey_west
+from fivebar_sim.identify.fit import Fit, fit
+from fivebar_sim.identify.intervals import NORMAL, Spread, newey_west
 from fivebar_sim.identify.measured import Measured, check
 from fivebar_sim.identify.parameters import DEFAULT, Case, Parameter, parameters, put
 from fivebar_sim.identify.predict import predict
@@ -96,10 +98,17 @@ def off(made: Made, found: Fit) -> Array:
     return np.abs(found.values - made.truth) / found.half_widths
 
 
+KEYS = ("leg.L1", "servo.kp", "servo.delay")
+
+
+@functools.cache
+def first() -> tuple[Made, Fit]:
+    log = made(1, KEYS, 1.5)
+    return log, fitted(log)
+
+
 def test_numbers_and_delay_of_a_leg_are_found() -> None:
-    keys = ("leg.L1", "servo.kp", "servo.delay")
-    log = made(1, keys, 1.5)
-    found = fitted(log)
+    log, found = first()
     # Outside one half-width is one of 20, outside two one of 10^4.
     assert (off(log, found) < 2.0).all()
     assert abs(found.values[2] - log.truth[2]) < 0.3e-3
@@ -107,10 +116,31 @@ def test_numbers_and_delay_of_a_leg_are_found() -> None:
     assert findings.untold(found) == []
     assert found.rms[0] < 1.3 * np.hypot(NOISE, COUNT / np.sqrt(12.0))
     assert found.rms[0] < 0.2 * found.rms_before[0]
-    other = made(2, keys, 1.5)
+    other = made(2, KEYS, 1.5)
     before, after = explained(SCENARIO, found, [other.log], 1)[0]
     assert before > 0.0
     assert after > 0.0
+
+
+def test_intervals_hold_the_truth_95_of_100_times() -> None:
+    """500 noises of an encoder on one motion: how they move the numbers, against the intervals.
+
+    That 100 fits move as this linear law says is what the long test shows.
+    """
+    log, found = first()
+    rng = np.random.default_rng(7)
+    said = predict([put(SCENARIO, log.chosen, found.values)], [log.log], 1)[0][0].theta
+    J = found.jacobian
+    move = np.linalg.pinv(J)
+    inside = np.zeros(len(KEYS))
+    for _ in range(500):
+        noisy = np.round((said + NOISE * rng.standard_normal(said.shape)) / COUNT) * COUNT
+        r = (noisy - said)[log.log.used].T.ravel() / found.rms[0]
+        moved = move @ r
+        spread = newey_west(J, r - J @ moved, [len(r) // 2] * 2)
+        inside += np.abs(moved) < spread.half_widths
+    # 500 trials scatter by 5 of 500.
+    assert ((inside > 460) & (inside < 492)).all(), inside
 
 
 def test_torque_per_current_is_found_where_currents_are_logged() -> None:
@@ -137,30 +167,12 @@ def test_the_truth_is_in_95_of_100_intervals() -> None:
 def plain(J: Array, values: Array | None = None) -> Fit:
     """Return a fit of two lengths with given derivatives and white noise."""
     chosen = parameters(SCENARIO, ["leg.L1", "leg.L4"])
-    log = Measured("", np.arange(len(J) // 2) / RATE, np.zeros((1, 2)), np.zeros((1, 2)))
     noise = np.random.default_rng(0).standard_normal(len(J))
-    log = log._replace(time=log.time + 1.0)
     doubt = np.array([each.doubt for each in chosen])
-    covariance = newey_west(J, [noise], [log]) * np.outer(doubt, doubt)
+    spread = newey_west(J, noise, [len(J) // 2] * 2)
+    spread = spread._replace(covariance=spread.covariance * np.outer(doubt, doubt))
     start = np.array([each.start for each in chosen])
-    return Fit(chosen, start if values is None else values, covariance, J, [0.0], [0.0], 1)
-
-
-def test_intervals_of_white_noise_are_the_textbooks() -> None:
-    J = np.random.default_rng(1).standard_normal((4000, 2))
-    found = plain(J)
-    doubt = np.array([each.doubt for each in found.parameters])
-    wanted = 1.96 * np.sqrt(np.diag(np.linalg.inv(J.T @ J))) * doubt
-    np.testing.assert_allclose(found.half_widths, wanted, rtol=0.1)
-
-
-def test_intervals_know_noise_that_lasts() -> None:
-    """Means of blocks of k equal residuals are sqrt(k) times less sure than as many white ones."""
-    J = np.ones((8000, 1))
-    log = Measured("", 1.0 + np.arange(4000) / RATE, np.zeros((1, 2)), np.zeros((1, 2)))
-    noise = np.repeat(np.random.default_rng(2).standard_normal(800), 10)
-    sd = np.sqrt(newey_west(J, [noise], [log])[0, 0])
-    assert sd == pytest.approx(1.0 / np.sqrt(800.0), rel=0.25)
+    return Fit(chosen, start if values is None else values, spread, J, [0.0], [0.0], 1)
 
 
 def test_what_cannot_be_told_apart_is_said() -> None:
@@ -185,7 +197,8 @@ def test_a_better_motion_is_found_and_the_result_written(tmp_path: Path) -> None
     still = Measured("still", time, ctrl, ctrl)
     values = np.array([0.061, 0.003])
     J = np.random.default_rng(0).standard_normal((402, 2))
-    found = Fit(chosen, values, np.diag([1e-8, 1e-10]), J, [1e-3], [1e-2], 1)
+    spread = Spread(np.diag([1e-8, 1e-10]), np.full(2, NORMAL))
+    found = Fit(chosen, values, spread, J, [1e-3], [1e-2], 1)
     better = motions.suggest(SCENARIO, found, still, 1)
     assert {each.name for each in better} == {"slow", "fast", "mixed", "steps"}
     # A delay is seen in what moves fast.

@@ -7,7 +7,8 @@ from typing import NamedTuple
 import numpy as np
 
 from fivebar_sim.arrays import Array
-from fivebar_sim.identify.fit import SURE, Fit
+from fivebar_sim.identify.fit import Fit
+from fivebar_sim.identify.intervals import NORMAL
 from fivebar_sim.identify.parameters import Parameter
 
 CORRELATED = 0.9
@@ -48,7 +49,7 @@ def untold(fit: Fit) -> list[Combination]:
     wider = inflation(fit)
     found = []
     for size, row in zip(s, rows, strict=True):
-        half = SURE * wider / max(float(size), 1e-300)
+        half = NORMAL * wider / max(float(size), 1e-300)
         if half <= 1.0:
             continue
         order = np.argsort(-np.abs(row))
@@ -60,11 +61,11 @@ def untold(fit: Fit) -> list[Combination]:
 
 
 def inflation(fit: Fit) -> float:
-    """Return by how much intervals are wider than with white residuals, the median."""
+    """Return by how much intervals are wider than of known white residuals, the median."""
     doubt = np.array([each.doubt for each in fit.parameters])
     white = np.linalg.pinv(fit.jacobian.T @ fit.jacobian, rcond=1e-14, hermitian=True)
     plain = np.sqrt(np.maximum(np.diag(white), 1e-300)) * doubt
-    return float(np.median(np.sqrt(np.diag(fit.covariance)) / plain))
+    return float(np.median(fit.half_widths / (NORMAL * plain)))
 
 
 def remarks(fit: Fit) -> list[str]:

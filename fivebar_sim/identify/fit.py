@@ -1,12 +1,4 @@
-"""Least squares: the numbers with which simulated legs say what logs say, and how sure they are.
-
-The residuals are not white: an encoder's counts repeat while a joint stands, and friction that the
-model does not know lasts. So the covariance of the result is that of Newey and West, whose middle
-has the products of gradients (row of J times residual) up to a lag apart:
-
-    cov = (J^T J)^-1 S (J^T J)^-1,   S = sum_t g_t g_t^T
-                                         + sum_l (1 - l / (m + 1)) sum_t (g_t g_(t+l)^T + transpose)
-"""
+"""Least squares: the numbers with which simulated legs say what logs say, and how sure they are."""
 
 from __future__ import annotations
 
@@ -17,6 +9,7 @@ import numpy as np
 
 from fivebar_sim.arrays import Array
 from fivebar_sim.errors import ConfigError
+from fivebar_sim.identify.intervals import Spread, newey_west
 from fivebar_sim.identify.measured import Measured
 from fivebar_sim.identify.parameters import Parameter, put
 from fivebar_sim.identify.predict import Predicted, predict
@@ -24,12 +17,6 @@ from fivebar_sim.scenario import Scenario
 
 STEP = 1e-3
 """Step of the finite differences, as a part of each number's doubt."""
-
-SURE = 1.959964
-"""Half-width of a 95 % interval in standard deviations."""
-
-MOST_LAG = 0.25
-"""Longest time over which residuals are taken to hang together [s]."""
 
 ANGLE_NOISE = 1e-3
 """Noise of angles that a fit begins with [rad]."""
@@ -44,7 +31,7 @@ class Fit(NamedTuple):
     Attributes:
         parameters: What was identified.
         values: Their numbers, (p,).
-        covariance: Of the numbers, (p, p).
+        spread: How far from the truth these may be.
         jacobian: Derivatives of the weighted residuals by numbers in doubts, (m, p).
         rms: RMS of the angles' residuals in each log, [rad].
         rms_before: The same with the scenario's own numbers [rad].
@@ -53,7 +40,7 @@ class Fit(NamedTuple):
 
     parameters: list[Parameter]
     values: Array
-    covariance: Array
+    spread: Spread
     jacobian: Array
     rms: list[float]
     rms_before: list[float]
@@ -62,13 +49,14 @@ class Fit(NamedTuple):
     @property
     def half_widths(self) -> Array:
         """Half of each 95 % interval, in the numbers' units, (p,)."""
-        return SURE * np.sqrt(np.diag(self.covariance))
+        return self.spread.half_widths
 
     @property
     def correlations(self) -> Array:
         """Correlation of each two numbers, (p, p)."""
-        sd = np.sqrt(np.diag(self.covariance))
-        return self.covariance / np.outer(sd, sd)
+        covariance = self.spread.covariance
+        sd = np.sqrt(np.diag(covariance))
+        return covariance / np.outer(sd, sd)
 
 
 class _Problem:
@@ -214,12 +202,13 @@ def fit(
         problem.reweigh(x)
 
     J = problem.jacobian(x)
-    covariance = newey_west(J, problem.rows(x)[0], logs)
+    channels = problem.rows(x)[0]
+    spread = newey_west(J, np.concatenate(channels), _lengths(logs, len(channels)))
     scale = np.outer(problem.doubt, problem.doubt)
     return Fit(
         parameters=chosen,
         values=problem.values(x),
-        covariance=covariance * scale,
+        spread=spread._replace(covariance=spread.covariance * scale),
         jacobian=J,
         rms=problem.angles(x),
         rms_before=before,
@@ -227,55 +216,11 @@ def fit(
     )
 
 
-def newey_west(J: Array, channels: Sequence[Array], logs: Sequence[Measured]) -> Array:
-    """Return the covariance of the numbers, in doubts, (p, p).
-
-    Args:
-        J: Derivatives of the weighted residuals, (m, p).
-        channels: The weighted residuals of each channel: log after log, A then E.
-        logs: The logs.
-    """
-    r = np.concatenate(channels)
-    lengths = [int(log.used.sum()) for log in logs for _ in range(2)]
-    with_current = [int(log.used.sum()) for log in logs if log.current is not None for _ in (0, 1)]
-    every = [*lengths, *(with_current if len(channels) > 1 else [])]
-    inverse = np.linalg.pinv(J.T @ J, rcond=1e-14, hermitian=True)
-    lag = max(1, round(MOST_LAG / logs[0].interval))
-    middle = np.zeros_like(inverse)
-    begin = 0
-    for n in every:
-        g = J[begin : begin + n] * r[begin : begin + n, None]
-        begin += n
-        own = _lasting(r[begin - n : begin], min(lag, n // 4))
-        middle += g.T @ g
-        for k in range(1, own + 1):
-            product = g[:-k].T @ g[k:]
-            middle += (1.0 - k / (own + 1.0)) * (product + product.T)
-
-    free = len(r) / max(len(r) - J.shape[1], 1)
-    lasting = free * inverse @ middle @ inverse
-    white = free * float(r @ r) / len(r) * np.diag(inverse)
-    # Of residuals that are white after all the estimate scatters: it must not be the surer one.
-    wider = np.sqrt(np.maximum(white / np.maximum(np.diag(lasting), 1e-300), 1.0))
-    return lasting * np.outer(wider, wider)
-
-
-def _lasting(r: Array, most: int) -> int:
-    """Return over how many samples residuals hang together: 3 times the first lag where not.
-
-    Args:
-        r: Residuals of one motor in one log.
-        most: The longest.
-    """
-    centred = r - r.mean()
-    power = float(centred @ centred)
-    if power == 0.0:
-        return 1
-    small = 2.0 / np.sqrt(len(r))
-    for k in range(1, most):
-        if abs(float(centred[:-k] @ centred[k:])) / power < small:
-            return min(3 * k, most)
-    return most
+def _lengths(logs: Sequence[Measured], channels: int) -> list[int]:
+    """Return the samples of each stretch of residuals: log after log, A then E."""
+    angles = [int(log.used.sum()) for log in logs for _ in "AE"]
+    currents = [int(log.used.sum()) for log in logs if log.current is not None for _ in "AE"]
+    return angles + (currents if channels > 1 else [])
 
 
 def _rms(values: Array) -> float:

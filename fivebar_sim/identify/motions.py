@@ -11,7 +11,8 @@ from fivebar_sim.arrays import Array
 from fivebar_sim.errors import FiveBarError
 from fivebar_sim.geometry import FiveBar
 from fivebar_sim.identify.findings import inflation
-from fivebar_sim.identify.fit import STEP, SURE, Fit
+from fivebar_sim.identify.fit import STEP, Fit
+from fivebar_sim.identify.intervals import NORMAL
 from fivebar_sim.identify.measured import Measured
 from fivebar_sim.identify.parameters import put
 from fivebar_sim.identify.predict import predict
@@ -85,7 +86,7 @@ def suggest(scenario: Scenario, fit: Fit, log: Measured, nthread: int = 0) -> li
     for i, (name, swing, motion) in enumerate(tried):
         first, *others = [each[i].theta[motion.used].ravel() for each in said]
         J = np.stack([(other - first) / STEP for other in others], axis=1) / noise
-        half = SURE * wider * np.sqrt(np.diag(np.linalg.pinv(J.T @ J, rcond=1e-14))) * doubt
+        half = NORMAL * wider * np.sqrt(np.diag(np.linalg.pinv(J.T @ J, rcond=1e-14))) * doubt
         found.append(Suggestion(name, swing, motion.time, motion.ctrl, half))
     return sorted(found, key=lambda each: float((each.half_widths / doubt).max()))
 
