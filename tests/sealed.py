@@ -26,5 +26,6 @@ def seal(place: Path) -> None:
 
     names = [path.name for path in place.iterdir() if path.suffix in (".toml", ".json", ".csv")]
     sums = checksums.of_files(place, names) | own
-    table = table.replace_schema_metadata(checksums.written(sums))
+    kept = table.schema.metadata or {}
+    table = table.replace_schema_metadata({**kept, **checksums.written(sums)})
     pyarrow.parquet.write_table(table, file, write_page_checksum=True)

@@ -15,6 +15,7 @@ from fivebar_sim import rollout
 from fivebar_sim.files import resources
 from fivebar_sim.rollout import Plan, Result
 from fivebar_sim.runs import directory
+from fivebar_sim.runs.anew import beside
 from fivebar_sim.scenario import Scenario
 
 NAMES = sorted(name for name in resources.shipped("scenarios") if not name.startswith("robot-"))
@@ -47,5 +48,5 @@ def written(name: str, folder: Path) -> Path:
         (folder / name).write_bytes(content)
     (folder / "metrics.json").write_text(json.dumps(result.metrics), encoding="utf-8")
     others = ["scenario.toml", "metrics.json", *result.scenario.files]
-    directory.write_record(folder, result.record, others)
+    directory.write_record(folder, result.record, others, beside.written(result.measured))
     return folder

@@ -325,7 +325,7 @@ def _with(key: str, value: object) -> Callable[[Path], object]:
             lambda run: (run / "rollout.parquet").write_bytes(b"PAR1"),
             "rollout.parquet is not a record",
         ),
-        (lambda run: (run / "metrics.json").unlink(), "it lacks metrics.json"),
+        (lambda run: (run / "scenario.toml").unlink(), "it lacks scenario.toml"),
         (_with("load.torque_rms.E", MISSING), "metrics.json: load.torque_rms.E is missing"),
         (_with("ground", MISSING), "metrics.json: a run of this scene lacks the key ground"),
     ],

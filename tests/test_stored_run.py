@@ -184,8 +184,8 @@ def _worded(run: Path, column: str) -> None:
         (lambda run: _changed(run, "theta_dot_B", 2e4), "theta_dot_B must be in [-10000, 10000], "),
         (lambda run: _changed(run, "time", 9.0), "column time must be 0.004 s in row 3, got 9"),
         (
-            lambda run: (run / "metrics.json").unlink(),
-            "is not a run directory: it lacks metrics.json",
+            lambda run: (run / "scenario.toml").unlink(),
+            "is not a run directory: it lacks scenario.toml",
         ),
         (lambda run: _rewritten(run / "scenario.toml", "x = 1"), "cannot be read as a run: "),
         (shutil.rmtree, "is not a run directory: no such directory"),

@@ -55,6 +55,12 @@ def page(runs: Sequence[StoredRun], drawn: list[Drawn]) -> str:
     """Return the page that compares runs; call it within `look.project_style`."""
     called = names(runs)
     summary = f"{len(runs)} runs: {', '.join(called)}. Differences are to the first."
+    anew = [name for name, run in zip(called, runs, strict=True) if run.anew]
+    if anew:
+        summary += (
+            f" The metrics of {', '.join(anew)} are computed anew from the record: metrics.json is "
+            "missing there."
+        )
     parts = [
         f"<header>\n<h1>{text('Comparison of runs')}</h1>\n<p>{text(summary)}</p>\n</header>",
         html.section("What differs in the scenarios", _differences(runs)),

@@ -29,6 +29,15 @@ TIMES = {
 """Times of metrics.json that are no metrics, and what happened then; None for never."""
 
 
+ANEW = (
+    "metrics.json is missing: all numbers here are computed anew from rollout.parquet and "
+    "scenario.toml. Where the run comes from, and the steps in which MuJoCo's solver did not "
+    "converge, are in no column, but beside them in that file. The forces of loop, gear friction "
+    "and ends of travel follow from Newton's law, so the guard on energy trusts them"
+)
+"""What readers of a run without metrics.json must know."""
+
+
 def figures(run: StoredRun) -> list[Drawn]:
     """Return the figures of a run; call it within `look.project_style`."""
     drawn = [
@@ -91,6 +100,8 @@ def head(run: StoredRun, about: str, warnings: Sequence[str] = ()) -> str:
         warnings: What its reader must know.
     """
     tripped = [f'<p class="fail">{text(said)}</p>' for said in guards.tripped(run.measured.guards)]
+    if run.anew:
+        warnings = [*warnings, ANEW]
     return "\n".join(
         [
             f"<header>\n<h1>{text(run.scenario.name)}</h1>",

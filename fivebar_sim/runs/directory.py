@@ -21,6 +21,7 @@ from fivebar_sim.errors import RunDirectoryError
 from fivebar_sim.files import exchange, leftovers, quantities, whole_file
 from fivebar_sim.metrics.columns import digest
 from fivebar_sim.runs import checksums, described, recorded
+from fivebar_sim.runs.anew import beside
 from fivebar_sim.runs.kept import DIVERGED, FILES, keep, own_names
 from fivebar_sim.scenario.run import Run
 
@@ -188,11 +189,16 @@ def _fill(stage: Path, result: Run) -> None:
     (stage / "metrics.json").write_text(text + "\n", encoding="utf-8")
     # Last of these: it has the checksums of the others.
     others = ["scenario.toml", "metrics.json", *scenario.files]
-    write_record(stage, result.record, others)
+    write_record(stage, result.record, others, beside.written(result.measured))
     recorded.write(stage / RECORDING, [result])
 
 
-def write_record(folder: Path, record: Mapping[str, Array], others: Iterable[str]) -> None:
+def write_record(
+    folder: Path,
+    record: Mapping[str, Array],
+    others: Iterable[str],
+    more: Mapping[bytes, bytes] | None = None,
+) -> None:
     """Write the record as Parquet, one column each, with units, and checksums that show damage.
 
     Byte by byte, as all signs and exponents are alike: a third of the size, in a third of the time.
@@ -201,6 +207,7 @@ def write_record(folder: Path, record: Mapping[str, Array], others: Iterable[str
         folder: The run directory.
         record: The columns.
         others: Names of the run's other files, which are there: their checksums go with it.
+        more: Further metadata.
     """
     import pyarrow
     import pyarrow.parquet
@@ -208,7 +215,7 @@ def write_record(folder: Path, record: Mapping[str, Array], others: Iterable[str
     sums = checksums.of_files(folder, others) | {checksums.RECORD: digest(record)}
     said = described.metadata(record)
     fields = [pyarrow.field(name, pyarrow.float64(), metadata=said.get(name)) for name in record]
-    schema = pyarrow.schema(fields, metadata=checksums.written(sums))
+    schema = pyarrow.schema(fields, metadata={**checksums.written(sums), **(more or {})})
     table = pyarrow.table(dict(record), schema=schema)
     # Given a name instead of a file, pyarrow would expand ~ and read it as a URI.
     with (folder / checksums.RECORD).open("wb") as file:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -51,8 +52,8 @@ MOST = {
 LARGEST = 1e100
 """Largest number in any other column: neither its square nor a plot of it can overflow."""
 
-SOURCES = ("scenario.toml", "metrics.json", "rollout.parquet")
-"""The files that a run is read from; the recording can be rebuilt and may be missing."""
+SOURCES = ("scenario.toml", "rollout.parquet")
+"""The files that a run is read from; metrics and recording can be made anew and may be missing."""
 
 
 class StoredRun(NamedTuple):
@@ -63,12 +64,14 @@ class StoredRun(NamedTuple):
         scenario: What was run.
         record: The columns of rollout.parquet, each (N,), SI.
         measured: All of metrics.json, with types.
+        anew: Whether that file is missing, and `measured` was computed from the record.
     """
 
     path: Path
     scenario: Scenario
     record: Record
     measured: Judged
+    anew: bool = False
 
     @property
     def metrics(self) -> dict[str, Any]:
@@ -81,14 +84,22 @@ def read(path: Path) -> StoredRun:
 
     Raises:
         RunDirectoryError: It lacks one of `SOURCES`, or a file of it is damaged, was changed after
-            the run, or is another run's; names the file.
+            the run, or is another run's; names the file. Without metrics.json: the record cannot
+            be measured.
     """
-    if not all((path / name).is_file() for name in SOURCES):
+    metrics = path / "metrics.json"
+    # A link to nowhere is no deleted file.
+    gone = not os.path.lexists(metrics)
+    sources = SOURCES if gone else (*SOURCES, metrics.name)
+    if not all((path / name).is_file() for name in sources):
         directory.check_run(path)
 
     file = path / checksums.RECORD
     with parquet_file.opened(file, "a record", RunDirectoryError) as parquet:
-        sums = checksums.read(parquet.schema_arrow.metadata)
+        metadata = parquet.schema_arrow.metadata
+        sums = checksums.read(metadata)
+        if gone:
+            sums.pop(metrics.name, None)
         # First: of a file of another run, any other message would be about the wrong one.
         checksums.check_files(path, sums)
         scenario = _scenario(path)
@@ -96,17 +107,25 @@ def read(path: Path) -> StoredRun:
 
     _check_plausible(file, record, scenario.sim.timestep)
     checksums.check_record(file, record, sums)
+    if gone:
+        # Only this needs MuJoCo.
+        from fivebar_sim.runs.anew import beside, measure
+
+        found = measure.measured(file, record, scenario, beside.read(metadata))
+        return StoredRun(path, scenario, record, found, anew=True)
+    return StoredRun(path, scenario, record, _metrics(metrics, scenario))
+
+
+def _metrics(file: Path, scenario: Scenario) -> Judged:
+    """Return what the metrics.json of a scenario's run says."""
     robot = isinstance(scenario, RobotScenario)
     grounded = isinstance(scenario.scene, Ground | Floor)
-    measured = stored_metrics.read(path / "metrics.json", grounded=grounded, robot=robot)
+    measured = stored_metrics.read(file, grounded=grounded, robot=robot)
     for key in scenario.limits:
         # What only some servos have is no field that every run must have.
         if not has(measured.table, key):
-            raise RunDirectoryError(
-                f"{path / 'metrics.json'}: {key} is missing: run its scenario.toml again"
-            )
-
-    return StoredRun(path, scenario, record, measured)
+            raise RunDirectoryError(f"{file}: {key} is missing: run its scenario.toml again")
+    return measured
 
 
 def _scenario(path: Path) -> Scenario:

@@ -1,0 +1,1 @@
+"""Measures a run anew from its record alone, where its metrics.json is gone."""
