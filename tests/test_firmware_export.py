@@ -145,7 +145,7 @@ def test_a_leg_that_float_cannot_hold_is_refused(
 def test_nothing_to_export_is_one_line(shell: Shell) -> None:
     said = shell("export", "classic")
     assert said.status == 2
-    options = "--mjcf FILE, --urdf FILE, --c DIR or --table FILE"
+    options = "--mjcf FILE, --urdf FILE, --c DIR, --table FILE or --mcap FILE"
     assert said.err == f"fivebar: say what to export: {options}\n"
 
 

@@ -12,7 +12,7 @@ from fivebar_sim.errors import ConfigError
 
 
 def export(
-    what: Positional[Annotated[str, arg(metavar="LEG|SCENARIO|ROBOT")]],
+    what: Positional[Annotated[str, arg(metavar="LEG|SCENARIO|ROBOT|RUN_DIR")]],
     /,
     *,
     mjcf: Annotated[Path | None, arg(metavar="FILE")] = None,
@@ -24,15 +24,16 @@ def export(
     rate: Annotated[float, arg(metavar="HZ")] = 50.0,
     servos: Annotated[str, arg(metavar="TABLE")] = "hanging",
     ends: Annotated[tuple[int, int] | None, arg(metavar="FIRST LAST")] = None,
+    mcap: Annotated[Path | None, arg(metavar="FILE")] = None,
 ) -> int:
-    """Write a leg as MJCF, URDF or a C library, or a gait as a table.
+    """Write a leg as MJCF, URDF or C, a gait as a table, a run as MCAP.
 
     docs/how-to/bring-a-model.md has more about models, docs/firmware.md about the library,
     docs/servos.md about the tables.
 
     Args:
         what: A shipped name or a TOML file: with --mjcf or --urdf a leg, a scenario or a robot,
-            with --c a leg, with --table a scenario.
+            with --c a leg, with --table a scenario; with --mcap a run directory.
         mjcf: File for the model that `fivebar run` simulates, .xml, for MuJoCo's viewer and MuJoCo
             Warp.
         urdf: File for the leg or the robot as a tree, .urdf; its closed loops are written beside
@@ -47,14 +48,18 @@ def export(
         rate: Rows of the table a second; a period must have a whole number of them.
         servos: For counts and microseconds: hanging, published or xl330.
         ends: First and last command of the servos' range (hobby servos: 0 180 counts, 500 2500 us).
+        mcap: File for every step of a run, .mcap, for Foxglove and PlotJuggler: units are in its
+            schema, scenario and metrics are attached. Needs the extra logs.
     """
-    _check_one({"--mjcf": mjcf, "--urdf": urdf, "--c": c, "--table": table})
+    _check_one({"--mjcf": mjcf, "--urdf": urdf, "--c": c, "--table": table, "--mcap": mcap})
     if mjcf is not None:
         return _mjcf(what, mjcf, robot)
     if urdf is not None:
         return _urdf(what, urdf, robot)
     if robot:
         raise ConfigError("--robot goes with --mjcf or --urdf")
+    if mcap is not None:
+        return _mcap(what, mcap)
     if table is not None:
         return _table(what, table, unit, rate, servos, ends)
 
@@ -72,7 +77,9 @@ def _check_one(wanted: Mapping[str, object]) -> None:
     """Raise unless exactly one of the options that name a place is given."""
     given = [name for name, place in wanted.items() if place is not None]
     if not given:
-        raise ConfigError("say what to export: --mjcf FILE, --urdf FILE, --c DIR or --table FILE")
+        raise ConfigError(
+            "say what to export: --mjcf FILE, --urdf FILE, --c DIR, --table FILE or --mcap FILE"
+        )
     if len(given) > 1:
         raise ConfigError(f"{' and '.join(given)}: export one at a time")
 
@@ -122,4 +129,14 @@ def _table(
     sent = setpoints.commands(scenario.leg, rows.theta, unit, servos=servos, ends=ends)
     setpoints.write(place, rows, sent)
     print(f"{rows.name}: {len(rows.theta)} rows, {sent.said}, written to {place}")  # noqa: T201
+    return 0
+
+
+def _mcap(source: str, place: Path) -> int:
+    """Write a run."""
+    from fivebar_sim.runs import mcap, stored
+
+    run = stored.read(Path(source))
+    mcap.write(run, place)
+    print(f"{run.scenario.name}: {run.scenario.steps} steps written as MCAP to {place}")  # noqa: T201
     return 0

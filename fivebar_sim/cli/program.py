@@ -37,7 +37,7 @@ COMMANDS = {
     "log": "Show what a log holds: columns, rate, gaps, ranges, and guesses.",
     "compare": "Lay a real leg's log over the simulated leg, sent its commands.",
     "certify": "Check any program that computes a leg against known answers.",
-    "export": "Write a leg as MJCF, URDF or a C library, or a gait as a table.",
+    "export": "Write a leg as MJCF, URDF or C, a gait as a table, a run as MCAP.",
     "import": "Understand the five-bar leg of an MJCF or URDF, as a preset.",
     "page": "Write a leg to play with on one HTML page, in any browser.",
 }

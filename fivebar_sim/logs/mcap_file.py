@@ -46,13 +46,15 @@ def open_file(source: Source, where: str) -> Raw:
     needed()
     names: dict[str, None] = {CLOCK: None}
     foreign: dict[str, str] = {}
+    units: dict[str, str] = {CLOCK: "ns"}
     seen: set[str] = set()
-    for topic, encoding, data, _ in _messages(source, where):
+    for topic, encoding, data, _, schema in _messages(source, where):
         if encoding != "json":
             foreign[topic] = encoding
         elif topic not in seen:
             seen.add(topic)
             names |= dict.fromkeys(_fields(topic, data, where))
+            units |= _units(topic, schema)
     if not seen:
         others = ", ".join(f"{topic} ({encoding})" for topic, encoding in foreign.items())
         raise ConfigError(
@@ -66,7 +68,13 @@ def open_file(source: Source, where: str) -> Raw:
     ]
     said = f"MCAP: {', '.join(sorted(seen))}"
     return Raw(
-        said, where, tuple(names), {}, ".", lambda wanted: _blocks(source, where, wanted), remarks
+        said,
+        where,
+        tuple(names),
+        units,
+        ".",
+        lambda wanted: _blocks(source, where, wanted),
+        remarks,
     )
 
 
@@ -87,7 +95,7 @@ def _blocks(source: Source, where: str, wanted: Sequence[str]) -> Iterator[Block
         }
         return Block(count - len(rows) + 1, cells)
 
-    for topic, encoding, data, time in _messages(source, where):
+    for topic, encoding, data, time, _ in _messages(source, where):
         if encoding != "json":
             continue
         rows.append({CLOCK: time, **_fields(topic, data, where)})
@@ -103,12 +111,13 @@ def _cell(value: Any, *, text: bool) -> Any:
     return str(value) if text and value is not None else value
 
 
-def _messages(source: Source, where: str) -> Iterator[tuple[str, str, bytes, int]]:
-    """Yield topic, encoding, data and time of each message, in the order of time."""
+def _messages(source: Source, where: str) -> Iterator[tuple[str, str, bytes, int, bytes]]:
+    """Yield topic, encoding, data, time and schema of each message, in the order of time."""
     try:
         with stream(source) as file:
-            for _, channel, message in _reader(file).iter_messages():
-                yield channel.topic, channel.message_encoding, message.data, message.log_time
+            for schema, channel, message in _reader(file).iter_messages():
+                told = b"" if schema is None else schema.data
+                yield channel.topic, channel.message_encoding, message.data, message.log_time, told
     except ConfigError:
         raise
     # Damaged bytes end in errors of any kind, of the library and of those that decompress for it.
@@ -131,3 +140,26 @@ def _fields(topic: str, data: bytes, where: str) -> dict[str, Any]:
         raise ConfigError(f"{where}: a message of {topic} is not JSON: {error}") from None
     name = topic.strip("/")
     return {f"{name}.{key}" if key else name: part for key, part in flat(value)}
+
+
+class _Property(msgspec.Struct):
+    """A number in a JSON schema; `unit` is what `runs.mcap` writes there."""
+
+    unit: str = ""
+
+
+class _Schema(msgspec.Struct):
+    """As much of a JSON schema as is read."""
+
+    properties: dict[str, _Property] = {}
+
+
+def _units(topic: str, schema: bytes) -> dict[str, str]:
+    """Return the units of a topic's fields, as far as its schema has any."""
+    try:
+        found = msgspec.json.decode(schema, type=_Schema)
+    # A schema only helps, and may be of any language.
+    except (msgspec.MsgspecError, RecursionError, UnicodeDecodeError):
+        return {}
+    front = topic.strip("/")
+    return {f"{front}.{key}": each.unit for key, each in found.properties.items() if each.unit}

@@ -2,22 +2,15 @@
 
 from __future__ import annotations
 
-import io
-import json
 from pathlib import Path
-
-import numpy as np
 
 from fivebar_sim.errors import ConfigError
 from fivebar_sim.files import whole_file
-from fivebar_sim.logs import mcap_file
 from fivebar_sim.logs.log import Log
+from fivebar_sim.runs import mcap as as_mcap
 
 KINDS = ("csv", "mcap")
 """The formats."""
-
-TOPIC = "/leg"
-"""The topic of the messages in MCAP."""
 
 
 def write(log: Log, place: Path) -> None:
@@ -44,22 +37,4 @@ def csv(log: Log) -> str:
 
 def mcap(log: Log) -> bytes:
     """Return a log as MCAP: a message a row, in JSON, at the row's time."""
-    mcap_file.needed()
-    from mcap.writer import Writer
-
-    out = io.BytesIO()
-    writer = Writer(out)
-    writer.start(profile="", library="fivebar-sim")
-    numbers = {name: {"type": "number"} for name in ("time", *log.channels)}
-    schema = json.dumps({"title": "leg", "type": "object", "properties": numbers})
-    number = writer.register_schema("leg", "jsonschema", schema.encode())
-    channel = writer.register_channel(TOPIC, "json", number)
-    columns = {"time": log.time, **log.channels}
-    moments = np.rint(1e9 * log.time).astype(np.int64).tolist()
-    for k, moment in enumerate(moments):
-        row = {name: float(values[k]) for name, values in columns.items()}
-        row = {name: value for name, value in row.items() if value == value}
-        writer.add_message(channel, moment, json.dumps(row).encode(), moment)
-
-    writer.finish()
-    return out.getvalue()
+    return as_mcap.encoded(as_mcap.LEG, {"time": log.time, **log.channels})
