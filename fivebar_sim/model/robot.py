@@ -14,14 +14,20 @@ from fivebar_sim.control.servo import Drive
 from fivebar_sim.errors import ArgumentError, GeometryError
 from fivebar_sim.files import resources
 from fivebar_sim.integrator import Integrator
+from fivebar_sim.model.ground import lay
 from fivebar_sim.model.leg import HIP_HEIGHT, leg_spec, quiet, set_options, standing
 from fivebar_sim.robots import LEGS, Air, Floor, Robot, Scene
+from fivebar_sim.robots.ground import Ground
+from fivebar_sim.robots.places import in_trunk
 
 BACKWARD = (0.0, 0.0, 0.0, 1.0)
 """Half a turn about z, as a quaternion."""
 
 NET_FORCE = (3, 3, 1)
 """A contact sensor's parameters for "found force", "netforce", one contact."""
+
+NET_WRENCH = (23, 3, 1)
+"""The same for "found force torque pos": on uneven ground a foot has several contacts."""
 
 
 def build_robot(
@@ -38,7 +44,8 @@ def build_robot(
     theta_B, theta_E, theta_D) of FL, FR, RL and RR; ctrl is (A, E) of each. Names are those of a
     leg with the leg's name in front, `FL_A`; `trunk` is the body between them, and `FL_ground` the
     force of the floor on a foot, along the world's axes, after a number that says whether there is
-    any. The keyframe is `home`, in the air, or `stand`, with the lowest foot on the floor.
+    any; on uneven ground its torque and its place follow. The keyframe is `home`, in the air, or
+    `stand`, with the lowest foot on the floor.
 
     Args:
         robot: The robot.
@@ -84,6 +91,7 @@ def robot_spec(
         set_options(spec, robot.leg, timestep, integrator)
         if isinstance(scene, Floor):
             spec.option.gravity = _downhill(spec.option.gravity, scene.slope)
+            lay(spec, scene.ground)
         _weigh(spec, robot)
         for name in LEGS:
             leg = leg_spec(
@@ -100,21 +108,26 @@ def robot_spec(
     return spec
 
 
-def standing_height(robot: Robot, q: Array) -> float:
+def standing_height(robot: Robot, q: Array, ground: Ground | None = None) -> float:
     """Return the trunk's height above the floor with the lowest foot just on it [m].
 
     Args:
-        robot: The robot, level.
+        robot: The robot, level, at the origin.
         q: Joint angles of its legs [rad], (4,) for all or (4, 4) in the order of `LEGS`.
+        ground: What lies on the floor; None: nothing.
 
     Raises:
         GeometryError: A foot is not below its hip.
     """
     poses = np.broadcast_to(q, (len(LEGS), 4))
-    heights = [
-        standing(robot.leg, pose) - robot.hips[name].pos[2]
-        for name, pose in zip(LEGS, poses, strict=True)
-    ]
+    heights = []
+    for name, pose in zip(LEGS, poses, strict=True):
+        hip = robot.hips[name]
+        height = standing(robot.leg, pose) - hip.pos[2]
+        if ground is not None and not ground.level:
+            x, y, _ = in_trunk(hip, kinematics.chain_points(robot.leg, pose).F).tolist()
+            height += ground.lift(x, y, robot.leg.foot_radius)
+        heights.append(height)
     return max(heights)
 
 
@@ -159,14 +172,16 @@ def _attach(spec: mujoco.MjSpec, leg: mujoco.MjSpec, robot: Robot, name: str, sc
     frame.attach_body(leg.body("hip"), f"{name}_", "")
 
     # As in the leg's own scenes: found, then the force over the step that led to the state.
+    bare = isinstance(scene, Air) or scene.ground.level
+    of = mujoco.mjtObj.mjOBJ_GEOM if bare else mujoco.mjtObj.mjOBJ_BODY
     spec.add_sensor(
         name=f"{name}_ground",
         type=mujoco.mjtSensor.mjSENS_CONTACT,
-        objtype=mujoco.mjtObj.mjOBJ_GEOM,
-        objname="floor",
+        objtype=of,
+        objname="floor" if bare else "world",
         reftype=mujoco.mjtObj.mjOBJ_GEOM,
         refname=f"{name}_foot",
-        intprm=NET_FORCE,
+        intprm=NET_FORCE if bare else NET_WRENCH,
     )
 
 
@@ -175,7 +190,7 @@ def _place(spec: mujoco.MjSpec, robot: Robot, scene: Scene, q: Array) -> None:
     lowest = min(hip.pos[2] for hip in robot.hips.values())
     height = HIP_HEIGHT * robot.leg.size - lowest
     if isinstance(scene, Floor):
-        height = standing_height(robot, q)
+        height = standing_height(robot, q, scene.ground)
     spec.body("trunk").pos = (0.0, 0.0, height)
 
 

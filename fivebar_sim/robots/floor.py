@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from fivebar_sim.checks import check_number
+from fivebar_sim.robots.ground import AnyGround, Flat
 from fivebar_sim.scenario import scenes
 
 STEEPEST = math.pi / 4.0
@@ -16,7 +17,7 @@ class Air(scenes.Scene, frozen=True, tag="air"):
 
 
 class Floor(scenes.Scene, frozen=True, tag="floor"):
-    """The trunk free above a flat floor, which the feet meet.
+    """The trunk free above a floor, which the feet meet, with what lies on it.
 
     The world's axes are those of the floor: on a slope it is gravity that leans. What a controller
     feeds forward for the legs' own weight knows of no slope.
@@ -24,10 +25,12 @@ class Floor(scenes.Scene, frozen=True, tag="floor"):
     Attributes:
         friction: Coulomb's coefficient between feet and floor.
         slope: Angle by which the floor rises towards +x [rad], where the robot faces at the start.
+        ground: What lies on it: nothing, steps, or points of random heights.
     """
 
     friction: float = 1.0
     slope: float = 0.0
+    ground: AnyGround = Flat()
 
     def __post_init__(self) -> None:
         check_number("friction", self.friction, "", low=0.0, high=100.0)

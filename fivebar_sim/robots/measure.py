@@ -108,7 +108,12 @@ def lean(quaternion: Array) -> Array:
     return np.arctan2(across, 1.0 - 2.0 * (x * x + y * y))
 
 
-def falls(trunk: Trunk, size: tuple[float, float, float], center: Array) -> list[Fall]:
+def falls(
+    trunk: Trunk,
+    size: tuple[float, float, float],
+    center: Array,
+    depth: Array | None = None,
+) -> list[Fall]:
     """Return every fall: a trunk that leans too far, or whose box touches the floor.
 
     One that lies falls no further: the next fall needs the trunk up again.
@@ -117,9 +122,11 @@ def falls(trunk: Trunk, size: tuple[float, float, float], center: Array) -> list
         trunk: The trunk after every step.
         size: Length, width and height of its box [m].
         center: The box's middle in the trunk's frame [m], (3,).
+        depth: How deep the box is in uneven ground after each step [m], (N,); None: the floor is
+            flat, and its lowest corner says so.
     """
     leaning = lean(trunk.quaternion)
-    touching = lowest(trunk, size, center) <= 0.0
+    touching = lowest(trunk, size, center) <= 0.0 if depth is None else depth > 0.0
     down = touching | (leaning > FALLEN)
     begins = np.flatnonzero(down & ~np.concatenate([[False], down[:-1]]))
     return [Fall(float(trunk.time[k]), _why(float(leaning[k]), bool(touching[k]))) for k in begins]

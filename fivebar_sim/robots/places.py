@@ -9,6 +9,7 @@ import numpy as np
 from fivebar_sim import kinematics
 from fivebar_sim.arrays import Array
 from fivebar_sim.metrics.columns import JOINT_COLUMNS, side_by_side
+from fivebar_sim.robots.ground import Ground
 from fivebar_sim.robots.measure import Trunk
 from fivebar_sim.robots.robot import Hip, Robot
 
@@ -51,18 +52,28 @@ def feet(trunk: Trunk, hip: Hip, record: Mapping[str, Array]) -> Array:
     return in_world(trunk, hip, side_by_side(record, ("foot_x", "foot_z")))
 
 
-def slid(robot: Robot, trunk: Trunk, hip: Hip, record: Mapping[str, Array]) -> Array:
+def slid(
+    robot: Robot,
+    trunk: Trunk,
+    hip: Hip,
+    record: Mapping[str, Array],
+    ground: Ground | None = None,
+) -> Array:
     """Return how far a foot slid over the floor in each step, in the air too [m], (N,).
 
     The foot is a ball of radius r on L2, which turns by w in the world; its lowest point moves by
 
         v + w x (0, 0, -r)
 
+    On uneven ground the point is at -r n, with the ground's normal n under the foot, and only what
+    is across n counts.
+
     Args:
         robot: The robot.
         trunk: The trunk after each step.
         hip: Where the leg is.
         record: The leg's columns, without its name in front.
+        ground: What lies on the floor; None: nothing.
     """
     h = float(trunk.time[0])
     axes = rotation(trunk.quaternion)
@@ -70,9 +81,17 @@ def slid(robot: Robot, trunk: Trunk, hip: Hip, record: Mapping[str, Array]) -> A
     sign = 1.0 if hip.mirrored else -1.0
     leg_turns = sign * (record["theta_dot_A"] + record["theta_dot_B"])[:, None] * axes[:, :, 1]
     turns = np.einsum("nij,nj->ni", axes, trunk.turning) + leg_turns
+    r = robot.leg.foot_radius
+    if ground is not None and not ground.level:
+        place = feet(trunk, hip, record)
+        normal = ground.normals(place[:, 0], place[:, 1])
+        way = np.diff(place, axis=0, prepend=place[:1]) - h * r * np.cross(turns, normal)
+        way[0] = 0.0
+        across = way - np.sum(way * normal, axis=1, keepdims=True) * normal
+        return np.linalg.norm(across, axis=1)
+
     moved = np.diff(feet(trunk, hip, record)[:, :2], axis=0, prepend=np.nan)
     moved[0] = 0.0
-    r = robot.leg.foot_radius
     rolled = h * r * np.stack([-turns[:, 1], turns[:, 0]], axis=-1)
     rolled[0] = 0.0
     return np.hypot(*(moved + rolled).T)

@@ -18,6 +18,8 @@ from fivebar_sim.metrics.guards import Guards
 from fivebar_sim.robots.floor import KINDS, Air, Floor
 from fivebar_sim.robots.floor import Scene as Stage
 from fivebar_sim.robots.gait import PHASES, Gait
+from fivebar_sim.robots.ground import KINDS as GROUNDS
+from fivebar_sim.robots.ground import Ground
 from fivebar_sim.robots.robot import LEGS, Robot
 from fivebar_sim.scenario import Scenario, reading
 from fivebar_sim.scenario.together import check_window
@@ -185,7 +187,27 @@ def _scene(value: Any, where: str) -> Stage:
     kind = own["kind"]
     if not isinstance(kind, str) or kind not in KINDS:
         raise ConfigError(f"{where}: {unknown('scene of a robot', str(kind), KINDS)}")
-    return tables.convert(own, KINDS[kind], "scene", where)
+    lying = own.get("ground")
+    if KINDS[kind] is not Floor or lying is None:
+        return tables.convert(own, KINDS[kind], "scene", where)
+
+    rest = {key: part for key, part in own.items() if key != "ground"}
+    floor = tables.convert(rest, Floor, "scene", where)
+    return msgspec.structs.replace(floor, ground=_ground(lying, where))
+
+
+def _ground(value: Any, where: str) -> Ground:
+    """Return what lies on a floor, of a kind's name, such as "rough", or of a table."""
+    own = {"kind": value} if isinstance(value, str) else value
+    if not isinstance(own, dict) or "kind" not in own:
+        raise ConfigError(
+            f"{where}: scene.ground must be one of {', '.join(GROUNDS)}, or a table with a kind, "
+            f"got {value!r}"
+        )
+    kind = own["kind"]
+    if not isinstance(kind, str) or kind not in GROUNDS:
+        raise ConfigError(f"{where}: scene.ground: {unknown('ground', str(kind), GROUNDS)}")
+    return tables.convert(own, GROUNDS[kind], "scene.ground", where)
 
 
 def _check_together(scenario: RobotScenario) -> None:

@@ -100,14 +100,16 @@ def _recorded(model: mujoco.MjModel) -> Bools:
 def recorded_columns(model: mujoco.MjModel) -> list[int]:
     """Return where sensordata has the floor's forces on the feet.
 
-    Of a leg alone x and z, since it moves in a plane; of each leg of a robot x, y and z.
+    Of a leg alone x and z, since it moves in a plane; of each leg of a robot x, y and z, and all
+    else that its sensor has.
     """
     columns = []
     for i in np.flatnonzero(_recorded(model)):
         # Before the force is a number that says whether there is any.
         start = int(model.sensor_adr[i]) + 1
         alone = model.sensor(i).name == RECORDED
-        columns += [start, start + 2] if alone else [start, start + 1, start + 2]
+        stop = int(model.sensor_adr[i] + model.sensor_dim[i])
+        columns += [start, start + 2] if alone else range(start, stop)
     return columns
 
 

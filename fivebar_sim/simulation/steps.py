@@ -41,7 +41,8 @@ class States(NamedTuple):
         qvel: [rad/s], (nsim, N, nv).
         ctrl: The commands of the step, (nsim, N, nu).
         ground: Force (x, z) of the ground on the foot during the step [N], (nsim, N, 2); without a
-            ground (nsim, N, 0); of a robot (x, y, z) on each foot, (nsim, N, 12).
+            ground (nsim, N, 0); of a robot (x, y, z) on each foot, (nsim, N, 12), and on uneven
+            ground its torque [N m] and its place [m], (nsim, N, 36).
         constraint: Joint forces of all constraints during the step [N m] (hinges), (nsim, N, nv).
         iterations: Of the constraint solver in the step, (nsim, N).
         warnings: MuJoCo's warnings of each simulation so far, (nsim,).

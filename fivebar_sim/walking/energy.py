@@ -15,7 +15,7 @@ from fivebar_sim.metrics.columns import motors
 from fivebar_sim.metrics.energy import STILL, Balance
 from fivebar_sim.robots import LEGS, Floor
 from fivebar_sim.robots.columns import FORCE_COLUMNS, of_leg
-from fivebar_sim.walking.walk import Walk, before
+from fivebar_sim.walking.walk import Walk, before, wrench
 
 
 def balance(went: Walk) -> Balance:
@@ -121,6 +121,8 @@ class _Meter:
         data = self._data
         h = self._went.plan.sim.timestep
         record = self._went.record
+        if self._went.depths is not None:
+            return self._uneven(w)
         force = np.stack(
             [np.stack([record[f"{leg}_{c}"] for c in FORCE_COLUMNS], axis=-1) for leg in LEGS],
             axis=1,
@@ -140,4 +142,27 @@ class _Meter:
                 point[2] = 0.5 * (point[2] - model.geom_size[geom, 0])
                 mujoco.mj_jac(model, data, jac, None, point, int(model.geom_bodyid[geom]))
                 found[k] += h * float(foot @ (jac @ w[k]))
+        return found
+
+    def _uneven(self, w: Array) -> Array:
+        """Return the work of uneven ground, whose force is known with its torque and place [J]."""
+        model = self._model
+        data = self._data
+        h = self._went.plan.sim.timestep
+        wrenches = np.stack([wrench(self._went.states, k) for k in range(len(LEGS))], axis=1)
+        bodies = [int(model.geom_bodyid[model.geom(f"{leg}_foot").id]) for leg in LEGS]
+        moves = np.empty((3, model.nv))
+        turns = np.empty((3, model.nv))
+        found = np.zeros(len(w))
+
+        for k in np.flatnonzero(wrenches[..., :3].any(axis=(1, 2))):
+            data.qpos[:] = self._q[k]
+            mujoco.mj_kinematics(model, data)
+            mujoco.mj_comPos(model, data)
+            for acting, body in zip(wrenches[k], bodies, strict=True):
+                if not acting[:3].any():
+                    continue
+                mujoco.mj_jac(model, data, moves, turns, acting[6:], body)
+                power = acting[:3] @ (moves @ w[k]) + acting[3:6] @ (turns @ w[k])
+                found[k] += h * float(power)
         return found

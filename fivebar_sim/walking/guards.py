@@ -119,17 +119,8 @@ def _grounded(went: Walk, leg: Seen) -> Record:
 def _on_floor(went: Walk, legs: list[Seen], run: Evidence) -> dict[str, Found]:
     """Return the guards of a robot on a floor: its feet's depth, what else is in it, its falls."""
     robot = went.plan.robot
-    trunk = went.trunk
-    assert trunk is not None
     bounds = run.bounds
-    feet = {leg.name: np.maximum(-leg.height, 0.0) for leg in legs if leg.height is not None}
-    parts: dict[str, Array] = {}
-    for leg in legs:
-        own = places.depths(robot, trunk, robot.hips[leg.name], leg.record)
-        parts |= {f"{leg.name} {part}": depth for part, depth in own.items()}
-    box = lowest(trunk, robot.trunk.size, np.array(robot.trunk.center))
-    parts["trunk"] = np.maximum(-box, 0.0)
-
+    feet, parts = _in_floor(went, legs) if went.depths is None else _in_ground(went.depths)
     fell = went.falls
     return {
         "ground": guards.first_of(run, feet, bounds.ground * 2.0 * robot.leg.foot_radius),
@@ -141,3 +132,25 @@ def _on_floor(went: Walk, legs: list[Seen], run: Evidence) -> dict[str, Found]:
             fell[0].why.replace(",", "") if fell else None,
         ),
     }
+
+
+def _in_floor(went: Walk, legs: list[Seen]) -> tuple[dict[str, Array], dict[str, Array]]:
+    """Return how deep feet, and all other parts, are in a flat floor [m], (N,) by their names."""
+    robot = went.plan.robot
+    trunk = went.trunk
+    assert trunk is not None
+    feet = {leg.name: np.maximum(-leg.height, 0.0) for leg in legs if leg.height is not None}
+    parts: dict[str, Array] = {}
+    for leg in legs:
+        own = places.depths(robot, trunk, robot.hips[leg.name], leg.record)
+        parts |= {f"{leg.name} {part}": depth for part, depth in own.items()}
+    box = lowest(trunk, robot.trunk.size, np.array(robot.trunk.center))
+    parts["trunk"] = np.maximum(-box, 0.0)
+    return feet, parts
+
+
+def _in_ground(depths: dict[str, Array]) -> tuple[dict[str, Array], dict[str, Array]]:
+    """Return the same of uneven ground."""
+    feet = {name.split()[0]: deep for name, deep in depths.items() if name.endswith("foot")}
+    parts = {name: deep for name, deep in depths.items() if not name.endswith("foot")}
+    return feet, parts

@@ -15,9 +15,10 @@ from fivebar_sim.metrics.columns import Record, motors
 from fivebar_sim.metrics.ground import GroundForce, GroundMetrics, longest
 from fivebar_sim.metrics.measured import Measured
 from fivebar_sim.metrics.sharing import Load
-from fivebar_sim.robots import LEGS, places, together
+from fivebar_sim.robots import LEGS, Floor, places, together
 from fivebar_sim.robots import measured as robots
 from fivebar_sim.robots.columns import of_leg
+from fivebar_sim.robots.ground import Flat
 from fivebar_sim.robots.measure import measure as how_it_moved
 from fivebar_sim.robots.measured import LegsTable, LegTable, RobotTable
 from fivebar_sim.simulation import record as recorded
@@ -123,8 +124,14 @@ def _leg(went: Walk, k: int) -> Leg:
     slid = height = None
     if force is not None and went.trunk is not None:
         hip = planned.robot.hips[name]
-        slid = np.where(force > 0.0, places.slid(planned.robot, went.trunk, hip, record), 0.0)
-        height = places.feet(went.trunk, hip, record)[:, 2] - planned.robot.leg.foot_radius
+        scene = planned.scene
+        ground = scene.ground if isinstance(scene, Floor) else Flat()
+        stands = force > 0.0
+        slid = np.where(stands, places.slid(planned.robot, went.trunk, hip, record, ground), 0.0)
+        x, y, z = places.feet(went.trunk, hip, record).T
+        height = z - planned.robot.leg.foot_radius
+        if not ground.level:
+            height = height - ground.heights(x, y)
     return Leg(
         name=name,
         record=record,

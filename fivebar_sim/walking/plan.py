@@ -133,7 +133,7 @@ def plan_scenario(scenario: RobotScenario) -> RobotPlan:
     legs = tuple(_of_leg(scenario, paths[leg], leg, built) for leg in LEGS)
     start = np.concatenate([leg.start for leg in legs])
     if isinstance(scenario.scene, Floor):
-        height = standing_height(robot, start.reshape(len(LEGS), 4))
+        height = standing_height(robot, start.reshape(len(LEGS), 4), scenario.scene.ground)
         start = np.concatenate([[0.0, 0.0, height, 1.0, 0.0, 0.0, 0.0], start])
 
     sent = [leg.setpoints for leg in legs if leg.setpoints is not None]

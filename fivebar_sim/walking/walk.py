@@ -19,6 +19,7 @@ from fivebar_sim.simulation.record import Part
 from fivebar_sim.simulation.steps import States, Watch, check_states, simulate
 from fivebar_sim.walking.plan import RobotPlan
 from fivebar_sim.walking.steer import steered
+from fivebar_sim.walking.touching import TRUNK, depths
 
 
 class Walk(NamedTuple):
@@ -32,6 +33,7 @@ class Walk(NamedTuple):
         trunk: The trunk after each step; None where it is held.
         falls: When it fell, and why.
         states: What MuJoCo had after each step.
+        depths: How deep each part is in uneven ground, see `touching.depths`; None of a flat floor.
     """
 
     plan: RobotPlan
@@ -39,6 +41,7 @@ class Walk(NamedTuple):
     trunk: Trunk | None
     falls: list[Fall]
     states: States
+    depths: dict[str, Array] | None = None
 
     def __repr__(self) -> str:
         """Return what it is of: the record would fill pages."""
@@ -107,8 +110,16 @@ def of_states(planned: RobotPlan, states: States) -> Walk:
 
     body = trunk(record)
     box = planned.robot.trunk
-    fell = [] if body is None else falls(body, box.size, np.array(box.center))
-    return Walk(planned, record, body, fell, states)
+    if body is None:
+        return Walk(planned, record, None, [], states)
+
+    scene = planned.scene
+    deep = depth = None
+    if isinstance(scene, Floor) and not scene.ground.level:
+        deep = depths(planned.robot, scene, states.qpos[0])
+        depth = deep[TRUNK]
+    fell = falls(body, box.size, np.array(box.center), depth)
+    return Walk(planned, record, body, fell, states, deep)
 
 
 def _leg(planned: RobotPlan, states: States, k: int) -> Record:
@@ -117,8 +128,18 @@ def _leg(planned: RobotPlan, states: States, k: int) -> Record:
     del record["time"]
     # Held out of reach of the floor, a foot has a sensor of its force too.
     if isinstance(planned.scene, Floor):
-        record |= dict(zip(FORCE_COLUMNS, states.ground[0, :, 3 * k : 3 * k + 3].T, strict=True))
+        force = wrench(states, k)[:, : len(FORCE_COLUMNS)]
+        record |= dict(zip(FORCE_COLUMNS, force.T, strict=True))
     return {name: np.ascontiguousarray(column) for name, column in record.items()}
+
+
+def wrench(states: States, k: int) -> Array:
+    """Return the floor's force on foot k, and on uneven ground its torque and place, (N, 3 or 9).
+
+    The torque is about the place, and all along the world's axes [N], [N m], [m].
+    """
+    width = states.ground.shape[-1] // len(LEGS)
+    return states.ground[0, :, width * k : width * (k + 1)]
 
 
 def jumped(went: Walk) -> Jump | None:
