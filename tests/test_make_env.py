@@ -72,6 +72,7 @@ def root(tmp_path: Path) -> Path:
 
 BOTH = ["requirements.lock", "requirements-dev.lock"]
 LOCKS = [*BOTH, "requirements-lint.lock"]
+EVERY = [*LOCKS, "requirements-gpu.lock"]
 
 
 def test_each_kind_installs_its_locks_once(root: Path, pip: Pip) -> None:
@@ -358,11 +359,12 @@ def names(file: str) -> set[str]:
 
 
 def test_locks_share_no_package_and_all_is_hashed() -> None:
-    run, dev, lint = (names(file) for file in LOCKS)
+    run, dev, lint, gpu = (names(file) for file in EVERY)
     assert {"mujoco", "numpy", "rerun-sdk", "gymnasium", "hatchling"} <= run
     assert {"pytest", "dm-control"} <= dev
     assert {"ruff", "basedpyright"} <= lint
-    assert len(run | dev | lint) == len(run) + len(dev) + len(lint)
-    for file in LOCKS:
+    assert gpu == {"mujoco-warp", "warp-lang"}
+    assert len(run | dev | lint | gpu) == len(run) + len(dev) + len(lint) + len(gpu)
+    for file in EVERY:
         entries = re.split(r"^(?=[a-z0-9])", (ROOT / file).read_text("utf-8"), flags=re.MULTILINE)
         assert [e.split()[0] for e in entries[1:] if "--hash=sha256:" not in e] == []
