@@ -141,7 +141,7 @@ def test_setting_without_effect_is_status_1(
 
 def test_another_process_computes_the_same_sines() -> None:
     script = runpy.run_path(str(SCRIPTS / "determinism_processor.py"))
-    here = os.environ.get(script["LIBC"], "")  # set where the suite stands in for an older processor
+    here = os.environ.get(script["LIBC"], "")  # set to stand in for an older processor
     assert script["libm_under"](here) == script["libm"]()
 
 
