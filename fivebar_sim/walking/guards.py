@@ -120,8 +120,9 @@ def _on_floor(went: Walk, legs: list[Seen], run: Evidence) -> dict[str, Found]:
     """Return the guards of a robot on a floor: its feet's depth, what else is in it, its falls."""
     robot = went.plan.robot
     bounds = run.bounds
-    feet, parts = _in_floor(went, legs) if went.depths is None else _in_ground(went.depths)
     fell = went.falls
+
+    feet, parts = _in_floor(went, legs) if went.depths is None else _in_ground(went.depths)
     return {
         "ground": guards.first_of(run, feet, bounds.ground * 2.0 * robot.leg.foot_radius),
         "floor": guards.first_of(run, parts, bounds.floor * robot.leg.size),

@@ -42,6 +42,7 @@ def states(planned: Plan, record: Record, unsolved: Bools) -> States:
     moves = "hip_z" in record
     q = side_by_side(record, [*HIP_COLUMNS[:1] * moves, *JOINT_COLUMNS])
     v = side_by_side(record, [*HIP_COLUMNS[1:] * moves, *RATE_COLUMNS])
+
     applied = np.zeros_like(v)
     applied[:, MOTORS_FROM_END] = motors(record, "torque")
     applied[:, MOTORS_FROM_END] -= planned.scenario.servo.gear.viscous * v[:, MOTORS_FROM_END]
