@@ -64,6 +64,20 @@ def test_file_is_the_classic_leg() -> None:
             np.testing.assert_array_equal(getattr(built.opt, option), getattr(file.opt, option))
 
 
+def test_a_leg_leaves_nothing_in_the_next_one() -> None:
+    """The files are parsed once; what is built changes a copy."""
+    for scene in ("air", "payload", "rail"):
+        first = content(model.build(ODD, scene=scene))
+        model.build(LEGS["classic"], scene=scene, drive="torque", timestep=2e-3)
+        assert content(model.build(ODD, scene=scene)) == first
+
+
+def content(mj: mujoco.MjModel) -> bytes:
+    whole = np.empty(mujoco.mj_sizeModel(mj), dtype=np.uint8)
+    mujoco.mj_saveModel(mj, None, whole)
+    return whole.tobytes()
+
+
 def test_every_part_is_named() -> None:
     mj = mujoco.MjModel.from_xml_path(str(FILE))
     kinds = {"body": mj.nbody, "jnt": mj.njnt, "geom": mj.ngeom, "site": mj.nsite, "cam": mj.ncam,

@@ -9,6 +9,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import cache
 from typing import get_args
 
 import mujoco
@@ -117,8 +118,7 @@ def leg_spec(
         raise ArgumentError(unknown("drive", str(drive), get_args(Drive)))
 
     file = "leg.xml" if scene is None else f"scenes/{scene.kind}.xml"
-    with quiet():
-        spec = mujoco.MjSpec.from_file(str(resources.folder("models") / file))
+    spec = shipped_spec(file)
     set_options(spec, leg, timestep, integrator)
 
     # The model is compiled in this pose: a closed one, far from every singularity.
@@ -136,6 +136,19 @@ def leg_spec(
     elif isinstance(scene, Ground):
         _stand(spec, leg, scene, q)
     return spec
+
+
+def shipped_spec(file: str) -> mujoco.MjSpec:
+    """Return what a file of the folder models says, free to be changed."""
+    # Parsing takes as long as compiling, a copy next to nothing.
+    with quiet():
+        return _parsed(file).copy()
+
+
+@cache
+def _parsed(file: str) -> mujoco.MjSpec:
+    """Return what a file of the folder models says, parsed once; nobody may change it."""
+    return mujoco.MjSpec.from_file(str(resources.folder("models") / file))
 
 
 def set_options(
