@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import gc
+import os
 from pathlib import Path
 
 import numpy as np
 import pytest
+import shared
 from hypothesis import HealthCheck, settings
 from shell import CSV, JUDGED, Shell
 
@@ -35,6 +37,13 @@ def pytest_collection_finish() -> None:
     gc.collect()
     gc.freeze()
     gc.set_threshold(10_000, 20, 20)
+
+
+@pytest.fixture(scope="session", autouse=True)
+def shared_folder(tmp_path_factory: pytest.TempPathFactory) -> None:
+    """Tell `shared` where the processes that run the tests together meet, if there are several."""
+    if "PYTEST_XDIST_WORKER" in os.environ:
+        shared.folders.append(tmp_path_factory.getbasetemp().parent)
 
 
 @pytest.fixture

@@ -1,4 +1,4 @@
-"""The shipped scenarios of legs, and what comes of them, simulated once for all tests of a process.
+"""The shipped scenarios of legs, and what comes of them, simulated once for all tests.
 
 Those of robots, whose names begin with "robot-", have tests of their own.
 """
@@ -10,6 +10,7 @@ from functools import cache
 from pathlib import Path
 
 import tomli_w
+from shared import once
 
 from fivebar_sim import rollout
 from fivebar_sim.files import resources
@@ -36,6 +37,10 @@ def planned(name: str) -> Plan:
 @cache
 def results() -> dict[str, Result]:
     """Return what comes of all scenarios, simulated together on two threads."""
+    return once("shipped", _simulated)
+
+
+def _simulated() -> dict[str, Result]:
     return dict(zip(NAMES, rollout.run_all([planned(n) for n in NAMES], nthread=2), strict=True))
 
 
