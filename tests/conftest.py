@@ -13,6 +13,7 @@ from hypothesis import HealthCheck, settings
 from shell import CSV, JUDGED, Shell
 
 from fivebar_sim.files import exchange
+from fivebar_sim.runs import coarse
 
 # An ordinary run draws the same examples every time; ./scripts/test --long asks for "random".
 # Neither judges how long an example takes: that is the machine's load, not the code's fault.
@@ -78,6 +79,10 @@ def two_steps(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture
 def light(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Write no recording but its first bytes: where the whole directory goes is what is asked."""
+    """Write no recording but its first bytes, and take no run again in shorter steps.
+
+    Where the directory goes is what is asked.
+    """
     write = "fivebar_sim.recording.rrd.write"
     monkeypatch.setattr(write, lambda path, runs, labels: path.write_bytes(b"RRF2"))
+    monkeypatch.setattr(coarse, "warnings", lambda result, again: [])

@@ -40,6 +40,12 @@ def results() -> dict[str, Result]:
     return once("shipped", _simulated)
 
 
+@cache
+def in_short() -> dict[str, Result]:
+    """Return what comes of all scenarios in their shortest form, each by itself."""
+    return once("in-short", lambda: {n: rollout.run(shortened(n)) for n in NAMES})
+
+
 def _simulated() -> dict[str, Result]:
     return dict(zip(NAMES, rollout.run_all([planned(n) for n in NAMES], nthread=2), strict=True))
 

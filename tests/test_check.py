@@ -11,7 +11,7 @@ from shell import ELLIPSE, JUDGED, Shell
 from shipped import results
 
 from fivebar_sim import rollout
-from fivebar_sim.runs import coarse, directory
+from fivebar_sim.runs import directory
 
 BASELINE = Path("baselines/short.json")
 FAST = ("classic-ellipse", "classic-figure-eight", "payload-ellipse", "q8bot-trot", "rail-hop")
@@ -64,17 +64,13 @@ def test_repeats_never_alarm_and_give_equal_files(recorded: Shell) -> None:
 def test_shipped_scenarios_pass_their_baselines_whole(
     shell: Shell, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """What comes of them is simulated once for all tests.
-
-    Nothing is asked of it in shorter steps: notes turn nothing red, and .ci/run has them printed.
-    """
+    """What comes of them is simulated once for all tests."""
     every = results()
 
     def known(plans: list[rollout.Plan], nthread: int = 1) -> list[rollout.Result]:
         return [every[plan.scenario.name] for plan in plans]
 
     monkeypatch.setattr(rollout, "run_all", known)
-    monkeypatch.setattr(coarse, "warnings", lambda result, again: [])
     before = shell.names()
     said = shell("check", *every)
     assert (said.status, said.err) == (0, "")
