@@ -59,20 +59,17 @@ def carried(
         psi_dot: Their rates [rad/s].
         tau: Motor torques (tau_A, tau_E) [N m].
     """
-    S = np.zeros(4)
+    # Plain numbers until the end: an operation on arrays of five takes as long as ten of them.
+    S = [0.0] * 4
     mass = trunk + sum(leg.mass)
     pull = 0.0
     for m, (_, arms) in zip(leg.mass, oracle.centres(leg, psi), strict=True):
-        S += m * np.array(oracle.jacobian(arms)[1])
+        for k, r in arms:
+            S[k] += m * r.real
         pull += m * oracle.centripetal(arms, psi_dot).imag
 
-    inertia = np.zeros((5, 5))
-    inertia[:4, :4] = oracle.mass_matrix(leg, psi)
-    inertia[:4, 4] = S
-    inertia[4, :4] = S
-    inertia[4, 4] = mass
-    right = np.array([tau[0], 0.0, 0.0, tau[1], mass * leg.gravity.imag - pull])
-    right[:4] -= oracle.bias(leg, psi, psi_dot)
+    inertia = [[*row, s] for row, s in zip(oracle.mass_matrix(leg, psi), S, strict=True)]
+    h1, h2, h3, h4 = oracle.bias(leg, psi, psi_dot)
 
     arms = oracle.loop(leg, psi)[1]
     gap = oracle.centripetal(arms, psi_dot)
@@ -80,8 +77,8 @@ def carried(
     J_x, J_z = oracle.jacobian(tip)
     J_x[1] += radius
     return Carried(
-        inertia=inertia,
-        right=right,
+        inertia=np.array([*inertia, [*S, mass]]),
+        right=np.array([tau[0] - h1, -h2, -h3, tau[1] - h4, mass * leg.gravity.imag - pull]),
         loop=(
             np.array([[*row, 0.0] for row in oracle.jacobian(arms)]),
             np.array([gap.real, gap.imag]),
@@ -106,7 +103,7 @@ def solved(inertia: Array, held: Array, right: Array, still: Array) -> tuple[Arr
     K[:5, :5] = inertia
     K[5:, :5] = held
     K[:5, 5:] = -held.T
-    found: Array = np.asarray(np.linalg.solve(K, np.concatenate([right, still])), np.float64)
+    found = np.array(oracle.solve(K, np.concatenate([right, still])))
     return found[:5], found[5:]
 
 

@@ -102,7 +102,12 @@ def _truth(
     law = air.servo_of(gains(leg), feedforward)
     path = air.path_of(squat(leg))
     times = GRID[: round(duration / air.TIMESTEPS[0])]
-    return oracle_stance.simulate(oracle.Leg.of(leg), ground, law, path, times, start=start)
+    return oracle_stance.simulate(
+        *(oracle.Leg.of(leg), ground, law, path, times),
+        start=start,
+        rtol=air.RTOL,
+        atol=0.1 * air.RTOL,
+    )
 
 
 def measure(key: Key, *, hard: bool = False, duration: float = DURATION) -> Error:
