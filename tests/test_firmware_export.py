@@ -45,7 +45,7 @@ def test_the_exported_leg_is_the_prepared_one(
     place = export.write(FiveBar.load(leg), tmp_path / "out")
     program = tmp_path / "same"
     include = f"-I{place}"
-    run("cc", "-O1", *flags, include, HERE / "same.c", place / export.SOURCE, "-o", program)
+    run("cc", "-O0", *flags, include, HERE / "same.c", place / export.SOURCE, "-o", program)
     run(program)
 
 
@@ -78,8 +78,8 @@ def test_the_sketch_plays_the_gait(tmp_path: Path) -> None:
     folders = (place, (place / SKETCH).parent, HERE / "stubs")
     include = [f"-I{folder}" for folder in folders]
     program = tmp_path / "play"
-    run("cc", "-std=c99", "-O1", "-c", place / export.SOURCE, "-o", tmp_path / "leg.o")
-    flags = ("-std=c++11", "-O1", "-Wall", "-Wextra", "-pedantic")
+    run("cc", "-std=c99", "-O0", "-c", place / export.SOURCE, "-o", tmp_path / "leg.o")
+    flags = ("-std=c++11", "-O0", "-Wall", "-Wextra", "-pedantic")
     run("c++", *flags, *include, HERE / "play.cpp", tmp_path / "leg.o", "-o", program)
     played = np.array([line.split() for line in run(program).splitlines()], dtype=int)
 
