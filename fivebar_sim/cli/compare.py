@@ -27,6 +27,7 @@ def compare(
     limits: Limits = (),
     settled: float = 0.25,
     out: Annotated[Path | None, arg(metavar="HTML")] = None,
+    recording: Annotated[Path | None, arg(metavar="RRD")] = None,
     quiet: bool = False,
     json: bool = False,
 ) -> int:
@@ -44,10 +45,13 @@ def compare(
             explained of theta_A, foot_x, torque_A, current_A and the like; may be repeated.
         settled: Time at the start that is not compared, since the run begins at rest [s].
         out: Write a page that shows log over run.
+        recording: Write a Rerun recording of both legs, the logged one in grey.
         quiet: Print nothing but errors.
         json: Print JSON instead of a table.
     """
     import json as text
+
+    from rich.markup import escape
 
     from fivebar_sim.checks import check_number
     from fivebar_sim.errors import ConfigError
@@ -62,13 +66,20 @@ def compare(
     with spinner(f"laying {log} over {loaded.name}", quiet=quiet):
         found = comparing.compare(loaded, load(log), settled)
     judged = found.judged(bounds)
+    if recording is not None:
+        from fivebar_sim.overlay import recording as both
+
+        both.write(found, recording)
     if out is not None:
-        page.write(found, judged, out)
+        page.write(found, judged, out, recording)
     if json:
         values = {**comparing.as_json(found.metrics), "failed": [j.key for j in judged if not j.ok]}
         print(text.dumps(values, indent=2, allow_nan=False))  # noqa: T201
     elif not quiet:
-        _print(found, judged, out, screen())
+        _print(found, judged, screen())
+        for name, place in (("page", out), ("recording", recording)):
+            if place is not None:
+                screen().print(f"{name} in {escape(str(place))}", soft_wrap=True)
     return FAILED if any(not each.ok for each in judged) else 0
 
 
@@ -89,7 +100,7 @@ def _bounds(log: Path, limits: tuple[str, ...]) -> dict[str, tuple[float, float]
     return {**table, **tables.bounds(given, KEYS, "limit", "--limit")}
 
 
-def _print(found: Compared, judged: list[Judged], out: Path | None, console: Console) -> None:
+def _print(found: Compared, judged: list[Judged], console: Console) -> None:
     """Print what is apart, and the limits."""
     from rich.markup import escape
     from rich.table import Table
@@ -122,5 +133,3 @@ def _print(found: Compared, judged: list[Judged], out: Path | None, console: Con
             f"{verdict(limit.ok)}",
             soft_wrap=True,
         )
-    if out is not None:
-        console.print(f"page in {escape(str(out))}", soft_wrap=True)

@@ -91,7 +91,7 @@ class Compared(NamedTuple):
         scenario: What was run.
         log: The log.
         is_played: Whether the run was sent the log's commands; else the scenario's own.
-        delay: How much later the log is than the run [s].
+        clock: How the log's times belong to the run's.
         time: Of the rows that are compared, on the log's clock [s], (n,).
         channels: By their names, those of `UNITS` that the log has.
         record: The run's record.
@@ -100,10 +100,20 @@ class Compared(NamedTuple):
     scenario: Scenario
     log: Log
     is_played: bool
-    delay: float
+    clock: Clock
     time: Array
     channels: dict[str, Channel]
     record: Record
+
+    @property
+    def delay(self) -> float:
+        """How much later the log is than the run [s]."""
+        return self.clock.delay
+
+    @property
+    def run_time(self) -> Array:
+        """The rows that are compared, on the run's clock [s], (n,)."""
+        return self.clock.of_run(self.time)
 
     @property
     def metrics(self) -> dict[str, float]:
@@ -168,9 +178,10 @@ def compare(scenario: Scenario, log: Log, settled: float = SETTLED) -> Compared:
     # The run's clock begins with the first row that has both angles.
     angles = align.hermite(record["time"], motors(record, "theta"), motors(record, "theta_dot"))
     late = _delay(ran, time - begin, theta, angles, settled, is_played=is_played)
-    channels = _channels(ran, log, record, angles, Clock(begin, late, settled))
-    rows = Clock(begin, late, settled).rows(log.time, record)
-    return Compared(ran, log, is_played, late, log.time[rows], channels, record)
+    clock = Clock(begin, late, settled)
+    channels = _channels(ran, log, record, angles, clock)
+    rows = clock.rows(log.time, record)
+    return Compared(ran, log, is_played, clock, log.time[rows], channels, record)
 
 
 class Clock(NamedTuple):

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+import os
 from pathlib import Path
+from urllib.parse import quote
 
 from fivebar_sim import units
 from fivebar_sim.errors import ConfigError
@@ -28,8 +30,16 @@ TITLES = {
 }
 
 
-def write(found: Compared, limits: list[Judged], place: Path) -> None:
+def write(
+    found: Compared, limits: list[Judged], place: Path, recording: Path | None = None
+) -> None:
     """Write the page of a comparison.
+
+    Args:
+        found: The comparison.
+        limits: Its limits.
+        place: A file that ends in .html.
+        recording: Its Rerun recording, which the page links; None for none.
 
     Raises:
         ConfigError: The place does not end in .html, or cannot be written.
@@ -37,12 +47,23 @@ def write(found: Compared, limits: list[Judged], place: Path) -> None:
     if place.suffix.lower() != ".html":
         raise ConfigError(f"cannot write {place}: a page must end in .html")
     with look.project_style():
-        text = page(found, limits, figures(found))
+        link = "" if recording is None else link_to(recording, place)
+        text = page(found, limits, figures(found), link)
     whole_file.write(place, text.encode("utf-8", "backslashreplace"))
 
 
-def page(found: Compared, limits: list[Judged], drawn: list[Drawn]) -> str:
-    """Return the page with its figures; call it within `look.project_style`."""
+def link_to(recording: Path, place: Path) -> str:
+    """Return a paragraph with a link from a page to a recording."""
+    # Both may be moved together: the way from one to the other stays.
+    way = Path(os.path.relpath(recording.absolute(), place.absolute().parent)).as_posix()
+    return (
+        f'<p>Both legs move in <a href="{html.text(quote(way))}">{html.text(recording.name)}</a>, '
+        "which <code>rerun</code> opens.</p>"
+    )
+
+
+def page(found: Compared, limits: list[Judged], drawn: list[Drawn], link: str = "") -> str:
+    """Return the page with its figures and a link; call it within `look.project_style`."""
     name = Path(found.log.where).name
     how = "was sent the log's commands" if found.is_played else "ran the scenario's own motion"
     about = (
@@ -55,7 +76,7 @@ def page(found: Compared, limits: list[Judged], drawn: list[Drawn]) -> str:
     if limits:
         ok = all(limit.ok for limit in limits)
         parts.append(f"<p>{html.judgement('pass' if ok else 'fail')}</p>")
-    parts.append(f"<p>{html.text(about)}</p>\n</header>")
+    parts.append(f"<p>{html.text(about)}</p>{link}\n</header>")
 
     # What was mended while the log was read.
     parts += [f"<p>{html.text(f'Note: {said}.')}</p>" for said in found.log.remarks]
