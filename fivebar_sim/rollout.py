@@ -142,13 +142,18 @@ class Result(NamedTuple):
     def replay(self) -> None:
         """Show the run in Rerun's viewer until its window is closed.
 
+        In a notebook it is shown below the cell, where `pip install "rerun-sdk[notebook]"` was.
+
         Raises:
             ConfigError: There is no screen.
         """
         from fivebar_sim.recording import viewer
         from fivebar_sim.render import screen
-        from fivebar_sim.runs import recording_file
+        from fivebar_sim.runs import inline, recording_file
 
+        if inline.fits():
+            inline.show(self)
+            return
         screen.check("`fivebar replay RUN_DIR --web` shows a run in a browser")
         with self._kept() as place, recording_file.opened((place,)) as file:
             command = viewer.native_command(file)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import sys
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -18,12 +19,15 @@ from fivebar_sim.control.servo import Servo
 from fivebar_sim.errors import ArgumentError, ConfigError, RunDirectoryError
 from fivebar_sim.files import resources
 from fivebar_sim.paths import Ellipse, Gait, Hop
+from fivebar_sim.recording.check import PROPERTY
 from fivebar_sim.regression import comparison
 from fivebar_sim.render import leg_lines
 from fivebar_sim.report import look, notebook
 from fivebar_sim.report.draw import Drawn
+from fivebar_sim.runs import inline
 from fivebar_sim.scenario.forces import Constant
 from fivebar_sim.scenario.scenes import Treadmill
+from fivebar_sim.simulation.provenance import identity
 
 ELLIPSE = Ellipse(centre=(0.0, -0.072), radii=(0.02, 0.008), frequency=2.0, ramp=0.25)
 
@@ -214,3 +218,64 @@ def test_refusal_of_a_report_without_a_name(tmp_path: Path) -> None:
     run_ = run(Scenario.load("classic-ellipse", ["duration=0.8"]))
     with pytest.raises(RunDirectoryError, match=r"a report must end in \.html"):
         run_.report(tmp_path / "page")
+
+
+class ViewerOfNotebooks:
+    """Stands in for Rerun's: keeps what it is sent."""
+
+    def __init__(self, *, recording: Any, width: str, height: int) -> None:
+        import rerun_bindings
+
+        assert (width, height) == ("auto", inline.HEIGHT)
+        self.sent: list[bytes] = []
+        self.seen = 0
+        rerun_bindings.set_callback_sink(recording=recording.to_native(), callback=self.sent.append)
+
+    def display(self) -> None:
+        """Show what came so far."""
+        self.seen = sum(map(len, self.sent))
+
+
+def test_replay_is_below_the_cell_where_a_notebook_can_show_it(
+    result: Result, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    from rerun import notebook as of_rerun
+    from rerun_bindings import RrdReaderInternal
+
+    made: list[ViewerOfNotebooks] = []
+
+    def make(**how: Any) -> ViewerOfNotebooks:
+        made.append(ViewerOfNotebooks(**how))
+        return made[-1]
+
+    monkeypatch.setattr(of_rerun, "Viewer", make)
+    monkeypatch.setattr(inline, "fits", lambda: True)
+    result.replay()
+    (viewer,) = made
+    assert viewer.seen == sum(map(len, viewer.sent)) > 10_000
+    chunks = []
+    # Each is a whole file, the first of them the layout's.
+    for k, part in enumerate(viewer.sent):
+        file = tmp_path / f"{k}.rrd"
+        file.write_bytes(part)
+        reader = RrdReaderInternal(str(file))
+        chunks += [c for each in reader.store_entries() for c in reader.stream(store=each)]
+    (whose,) = [c for c in chunks if c.entity_path == f"/__properties/{PROPERTY}"]
+    told = whose.to_record_batch()["sha256"].to_pylist()[0][0]
+    assert told == identity(result.scenario, result.record, result.measured)
+
+
+@pytest.mark.parametrize("installed", [True, False])
+def test_only_notebooks_with_the_viewer_show_recordings(
+    installed: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(inline, "find_spec", lambda name: name if installed else None)
+    monkeypatch.delitem(sys.modules, "IPython", raising=False)
+    assert not inline.fits()
+
+    of_terminal = SimpleNamespace()
+    of_notebook = SimpleNamespace(kernel=1)
+    for shell in (None, of_terminal, of_notebook):
+        ipython = SimpleNamespace(get_ipython=lambda shell=shell: shell)
+        monkeypatch.setitem(sys.modules, "IPython", ipython)  # pyright: ignore[reportArgumentType]
+        assert inline.fits() == (installed and shell is of_notebook)

@@ -73,7 +73,7 @@ def write(path: Path, runs: Sequence[Run], labels: Sequence[str] = ()) -> None:
     """
     names = list(labels) or [run.scenario.name for run in runs]
     with file_of(path, names) as stream:
-        _send(stream, runs, names)
+        send(stream, runs, names)
 
 
 @contextmanager
@@ -129,8 +129,8 @@ def _load() -> None:
             del os.environ["RUST_LOG"]
 
 
-def _send(stream: rr.RecordingStream, runs: Sequence[Run], names: list[str]) -> None:
-    """Send the layout, the text, the floor and all runs."""
+def send(stream: rr.RecordingStream, runs: Sequence[Run], names: list[str]) -> None:
+    """Send the layout, the text, the floor and all runs, each with its name."""
     import rerun as rr
 
     shown = looks(names)

@@ -4,12 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from fivebar_sim.errors import ConfigError
 from fivebar_sim.recording import rrd
 from fivebar_sim.robots.scenario import RobotScenario
 from fivebar_sim.scenario.run import Run
 from fivebar_sim.walking import recording as robots
+
+if TYPE_CHECKING:
+    import rerun as rr
 
 
 def write(path: Path, runs: Sequence[Run], labels: Sequence[str] = ()) -> None:
@@ -24,6 +28,17 @@ def write(path: Path, runs: Sequence[Run], labels: Sequence[str] = ()) -> None:
         robots.write(path, runs, labels)
     else:
         rrd.write(path, runs, labels)
+
+
+def send(stream: rr.RecordingStream, runs: Sequence[Run], labels: Sequence[str] = ()) -> None:
+    """Send the recording of one or more runs to a stream; see `write`.
+
+    Raises:
+        ConfigError: Some of the runs are of robots, and some are of legs.
+    """
+    names = list(labels) or [run.scenario.name for run in runs]
+    kind = robots if all_of_robots(runs) else rrd
+    kind.send(stream, runs, names)
 
 
 def all_of_robots(runs: Sequence[Run]) -> bool:

@@ -48,11 +48,11 @@ def write(path: Path, runs: Sequence[Run], labels: Sequence[str] = ()) -> None:
     """Write the recording of one or more robots' runs to a .rrd file; see `rrd.write`."""
     names = list(labels) or [run.scenario.name for run in runs]
     with rrd.file_of(path, names) as stream:
-        _send(stream, runs, names)
+        send(stream, runs, names)
 
 
-def _send(stream: rr.RecordingStream, runs: Sequence[Run], names: list[str]) -> None:
-    """Send the layout, the text, the floor and all runs."""
+def send(stream: rr.RecordingStream, runs: Sequence[Run], names: list[str]) -> None:
+    """Send the layout, the text, the floor and all runs, each with its name."""
     import rerun as rr
 
     shown = looks(names)
