@@ -90,5 +90,5 @@ def _print(seen: Understood) -> None:
     if not console.is_terminal:
         console.width = WIDEST
     console.print(table)
-    for note in seen.notes:
+    for note in preset.notes(seen):
         console.print(escape(f"not taken over: {note}"), soft_wrap=True)

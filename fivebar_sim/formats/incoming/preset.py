@@ -63,20 +63,47 @@ def _hinge(seen: Understood, k: int) -> str:
     joint = seen.loop.hinges[k]
     if joint == CLOSING or HINGES[k] == "C":
         return "passive"
-    model = seen.source.model
     sign, offset = seen.reading(k)
     driven = HINGES[k] in "AE"
 
     shift = f" {offset:+.6g} rad" if offset else ""
     parts = [f"theta_{HINGES[k]} = {'' if sign > 0 else '-'}q{shift}" if driven else "passive"]
-    ends = sorted(sign * each + offset for each in model.jnt_range[joint].tolist())
-    if model.jnt_limited[joint] and ends[1] - ends[0] < REACH:
+    ends = ends_of(seen, k)
+    if ends is not None:
         which = "" if driven else f"theta_{HINGES[k]} "
         parts.append(f"{which}in [{ends[0]:.4g}, {ends[1]:.4g}] rad")
     torque = _torque(seen, joint) if driven else None
     if torque is not None:
         parts.append(f"up to {units.text(torque, 'N m')}")
     return ", ".join(parts)
+
+
+def ends_of(seen: Understood, k: int) -> tuple[float, float] | None:
+    """Return the ends of a joint's range as an angle of the leg [rad]; None if it has none.
+
+    Args:
+        seen: The leg.
+        k: As in `Understood.reading`.
+    """
+    joint = seen.loop.hinges[k]
+    if joint == CLOSING or not seen.source.model.jnt_limited[joint]:
+        return None
+    sign, offset = seen.reading(k)
+    low, high = sorted(sign * each + offset for each in seen.source.model.jnt_range[joint].tolist())
+    return (low, high) if high - low < REACH else None
+
+
+def notes(seen: Understood) -> Iterator[str]:
+    """Yield a line for everything that was not taken over; of ranges every digit."""
+    yield from seen.notes
+    for k in (0, 1, 3, 4):
+        ends = ends_of(seen, k)
+        if ends is not None:
+            name = hinge_name(seen.source, seen.loop, k)
+            yield (
+                f"{name}: its range, theta_{HINGES[k]} in [{ends[0]!r}, {ends[1]!r}] rad, is not "
+                "of a leg, and no run keeps it"
+            )
 
 
 def _torque(seen: Understood, joint: int) -> float | None:
@@ -93,9 +120,10 @@ def text(seen: Understood) -> str:
     """Return the TOML of a leg's preset; its numbers read back as they are."""
     lines = [f"# Understood from {seen.source.path.name} by fivebar import:"]
     lines += [f"#   {what:4}  {there}: {is_}" for what, there, is_ in rows(seen)]
-    if seen.notes:
+    left = list(notes(seen))
+    if left:
         lines.append("# Not taken over:")
-        lines += [f"#   {note}" for note in seen.notes]
+        lines += [f"#   {note}" for note in left]
     for key in KEYS:
         value = getattr(seen.leg, key)
         if value is None or (key in ("L6", "bend", "tilt") and value == 0.0):
