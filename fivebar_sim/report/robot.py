@@ -8,7 +8,7 @@ from fivebar_sim.metrics.limits import has, look_up
 from fivebar_sim.report import html, single
 from fivebar_sim.report.draw import Drawn
 from fivebar_sim.report.robot_figures import figures, robot_of
-from fivebar_sim.robots import LEGS
+from fivebar_sim.robots import LEGS, Floor
 from fivebar_sim.runs.stored import StoredRun
 
 __all__ = ["figures", "page"]
@@ -55,13 +55,19 @@ def _head(run: StoredRun) -> str:
     about = (
         f"The robot {robot.name} of {units.text(1e3 * robot.mass, 'g')}, with four legs "
         f"{robot.leg.name}, follows a path of kind {scenario.path.__struct_config__.tag} in the "
-        f"scene {scenario.scene.kind}, driven by the controller {scenario.controller_name}, for "
+        f"scene {scenario.scene.kind}{_lying(scenario.scene)}, driven by the controller "
+        f"{scenario.controller_name}, for "
         f"{scenario.duration:g} s in steps of {1e3 * h:g} ms. It is measured in the window from "
         f"{window.start * h:.4g} s to {window.stop * h:.4g} s, what is called (run) over the whole "
         f"run; a number without a leg's name is that of all legs together."
     )
 
     return single.head(run, about)
+
+
+def _lying(scene: object) -> str:
+    """Return what lies on the floor of a scene, in words."""
+    return scene.ground.words if isinstance(scene, Floor) else ""
 
 
 def _legs(run: StoredRun) -> str:

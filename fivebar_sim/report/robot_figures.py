@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from fivebar_sim.arrays import Array
@@ -11,11 +13,22 @@ from fivebar_sim.metrics.tracking import tracking_error
 from fivebar_sim.report import axes, draw
 from fivebar_sim.report.draw import Drawn
 from fivebar_sim.report.look import colour
-from fivebar_sim.robots import LEGS, Robot, places
+from fivebar_sim.robots import LEGS, Floor, Robot, places
 from fivebar_sim.robots.columns import of_leg, trunk
 from fivebar_sim.robots.measure import Trunk, heading, lean
 from fivebar_sim.robots.scenario import RobotScenario
 from fivebar_sim.runs.stored import StoredRun
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+FELT = 160
+"""Points along each side of the ground's map."""
+
+CONTOUR_LINES = 4
+"""Heights at which uneven ground is outlined."""
+
+CONTOURS = " Thin: contours of the ground."
 
 OUTLINES = 6
 """Outlines of the trunk along its path."""
@@ -50,6 +63,7 @@ def from_above(run: StoredRun, body: Trunk) -> Drawn:
         some = draw.envelope(x) if len(x) else slice(None)
         ax.plot(x[some], y[some], ".", color=colour(NAMED[leg]), ms=2.5, label=leg)
 
+    uneven = _contours(ax, run, body)
     x, y, _ = 1e3 * body.position.T
     ax.plot(x, y, color=colour("ink"), lw=1.6)
     turned = heading(body.quaternion)
@@ -65,11 +79,28 @@ def from_above(run: StoredRun, body: Trunk) -> Drawn:
         "Path from above",
         "The trunk's way (line) with its outline at equal times, the last one dark; x is where it "
         "faced at the start. Dots: where each foot touched the floor. A foot that slides draws a "
-        "line.",
+        f"line.{CONTOURS * uneven}",
         f"The trunk's path from above, with the feet's prints; it ends {went} from the start along "
         "x and y.",
         figure,
     )
+
+
+def _contours(ax: Axes, run: StoredRun, body: Trunk) -> bool:
+    """Draw where uneven ground is equally high, around the trunk's way; return whether it is."""
+    scene = run.scenario.scene
+    if not isinstance(scene, Floor) or scene.ground.level:
+        return False
+    reach = robot_of(run).length
+    ends = [(line.min() - reach, line.max() + reach) for line in body.position[:, :2].T]
+    x, y = np.meshgrid(*(np.linspace(low, high, FELT) for low, high in ends))
+    heights = scene.ground.heights(x, y)
+    if np.ptp(heights) > 0.0:
+        between = np.linspace(heights.min(), heights.max(), CONTOUR_LINES + 2)[1:-1]
+        ax.contour(
+            1e3 * x, 1e3 * y, heights, between, colors=[colour("muted")], linewidths=0.4, alpha=0.7
+        )
+    return True
 
 
 def _outline(robot: Robot, turned: float) -> Array:

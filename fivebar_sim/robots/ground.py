@@ -13,6 +13,7 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
+from fivebar_sim import units
 from fivebar_sim.arrays import Array
 from fivebar_sim.checks import check_number
 from fivebar_sim.errors import ArgumentError
@@ -38,6 +39,11 @@ class Ground(
 
     level: ClassVar[bool] = False
     """Whether it is the floor alone."""
+
+    @property
+    def words(self) -> str:
+        """What it is, for reports: " with rough ground of 5 mm"; nothing of a flat floor."""
+        return ""
 
     def heights(self, x: Array, y: Array) -> Array:
         """Return its height above the floor's zero at places [m], of their shape.
@@ -98,6 +104,11 @@ class Steps(Ground, frozen=True, tag="steps"):
         check_number("count", self.count, "", low=1, high=MOST)
 
     @property
+    def words(self) -> str:
+        """How many steps, and how high; see `Ground.words`."""
+        return f" with {self.count} steps of {units.text(1e3 * self.height, 'mm')}"
+
+    @property
     def edges(self) -> Array:
         """Where each step begins [m], (count,)."""
         return self.start + self.length * np.arange(self.count, dtype=np.float64)
@@ -133,6 +144,11 @@ class Rough(Ground, frozen=True, tag="rough", dict=True):
         check_number("size", self.size, "m", low=3.0 * self.cell, high=MOST * self.cell)
         if not 0 <= self.seed < 2**63:
             raise ArgumentError(f"seed must be in [0, 2^63), got {self.seed}")
+
+    @property
+    def words(self) -> str:
+        """How high; see `Ground.words`."""
+        return f" with rough ground of {units.text(1e3 * self.height, 'mm')}"
 
     @property
     def side(self) -> float:

@@ -23,12 +23,13 @@ from fivebar_sim.recording.plots import Series
 from fivebar_sim.recording.poses import Room, Rows, drawn_motion, drawn_rows
 from fivebar_sim.recording.summary import summary
 from fivebar_sim.render import palette
-from fivebar_sim.robots import LEGS, Robot, places
+from fivebar_sim.robots import LEGS, Floor, Robot, places
 from fivebar_sim.robots.columns import of_leg, trunk
 from fivebar_sim.robots.measure import Trunk, heading, lean
 from fivebar_sim.robots.scenario import RobotScenario
 from fivebar_sim.scenario.run import Run
 from fivebar_sim.simulation.provenance import identity
+from fivebar_sim.walking import recorded_ground
 
 if TYPE_CHECKING:
     import rerun as rr
@@ -66,7 +67,10 @@ def send(stream: rr.RecordingStream, runs: Sequence[Run], names: list[str]) -> N
     )
     layout.send(stream, layout.contents(room, shown, plots))
     stream.log(layout.SUMMARY, rr.TextDocument(text, media_type="text/markdown"), static=True)
-    rrd.log_room(stream, room)
+    grounds = [run.scenario.scene for run in runs]
+    uneven = [isinstance(scene, Floor) and not scene.ground.level for scene in grounds]
+    # A floor that no run is on would hide the ground of those that there are.
+    rrd.log_room(stream, room._replace(floor=room.floor and not all(uneven)))
     for run, look, own in zip(runs, shown, plots, strict=True):
         _send_run(stream, run, look, room)
         time = run.record["time"]
@@ -81,10 +85,13 @@ def _robot(run: Run) -> Robot:
 
 
 def _send_run(stream: rr.RecordingStream, run: Run, look: Look, room: Room) -> None:
-    """Send one run: the robot's numbers and its motion, and the floor's forces."""
+    """Send one run: the robot's numbers and its motion, its ground, and the floor's forces."""
     import rerun as rr
 
     robot = _robot(run)
+    scene = run.scenario.scene
+    if isinstance(scene, Floor) and not scene.ground.level:
+        recorded_ground.log(stream, room, scene.ground, look.root)
     time = run.record["time"]
     rows = drawn_rows(time)
     drawn = rrd.times(time[rows], rows + 1)
