@@ -16,11 +16,15 @@ from fivebar_sim.integrator import Integrator
 from fivebar_sim.model.ground import lay
 from fivebar_sim.model.leg import HIP_HEIGHT, leg_spec, quiet, set_options, shipped_spec, standing
 from fivebar_sim.robots import LEGS, Air, Floor, Robot, Scene
+from fivebar_sim.robots.floor import Payload
 from fivebar_sim.robots.ground import Ground
 from fivebar_sim.robots.places import in_trunk
 
 BACKWARD = (0.0, 0.0, 0.0, 1.0)
 """Half a turn about z, as a quaternion."""
+
+SMALLEST_INERTIA = 1e-14
+"""Of a body that MuJoCo takes [kg m^2]."""
 
 NET_FORCE = (3, 3, 1)
 """A contact sensor's parameters for "found force", "netforce", one contact."""
@@ -89,6 +93,7 @@ def robot_spec(
         if isinstance(scene, Floor):
             spec.option.gravity = _downhill(spec.option.gravity, scene.slope)
             lay(spec, scene.ground)
+            _carry(spec, robot, scene.payload)
         _weigh(spec, robot)
         for name in LEGS:
             leg = leg_spec(
@@ -156,6 +161,23 @@ def _weigh(spec: mujoco.MjSpec, robot: Robot) -> None:
     box = spec.geom("trunk")
     box.pos = trunk.center
     box.size = 0.5 * np.array(trunk.size)
+
+
+def _carry(spec: mujoco.MjSpec, robot: Robot, payload: Payload) -> None:
+    """Fix a payload to the trunk, if there is any; it collides with nothing."""
+    if payload.mass == 0.0:
+        return
+    body = spec.body("trunk").add_body(name="payload", pos=payload.at)
+    body.explicitinertial = True
+    body.mass = payload.mass
+    body.ipos = (0.0, 0.0, 0.0)
+    # A point has none, which MuJoCo does not take: that of a ball of a micrometre.
+    body.inertia = np.full(3, max(1e-12 * payload.mass, SMALLEST_INERTIA))
+    ball = mujoco.mjtGeom.mjGEOM_SPHERE
+    size = (0.25 * min(robot.trunk.size), 0.0, 0.0)
+    body.add_geom(
+        name="payload", type=ball, size=size, material="trunk", contype=0, conaffinity=0, mass=0.0
+    )
 
 
 def _attach(spec: mujoco.MjSpec, leg: mujoco.MjSpec, robot: Robot, name: str, scene: Scene) -> None:

@@ -9,6 +9,7 @@ from fivebar_sim.report import html, single
 from fivebar_sim.report.draw import Drawn
 from fivebar_sim.report.robot_figures import figures, robot_of
 from fivebar_sim.robots import LEGS, Floor
+from fivebar_sim.robots.floor import load
 from fivebar_sim.runs.stored import StoredRun
 
 __all__ = ["figures", "page"]
@@ -66,8 +67,11 @@ def _head(run: StoredRun) -> str:
 
 
 def _lying(scene: object) -> str:
-    """Return what lies on the floor of a scene, in words."""
-    return scene.ground.words if isinstance(scene, Floor) else ""
+    """Return what lies on the floor of a scene, and what the robot carries, in words."""
+    if not isinstance(scene, Floor):
+        return ""
+    carried = f", carrying {units.text(1e3 * scene.payload.mass, 'g')}" * (load(scene) > 0.0)
+    return f"{scene.ground.words}{carried}"
 
 
 def _legs(run: StoredRun) -> str:

@@ -15,6 +15,7 @@ from fivebar_sim.report.draw import Drawn
 from fivebar_sim.report.look import colour
 from fivebar_sim.robots import LEGS, Floor, Robot, places
 from fivebar_sim.robots.columns import of_leg, trunk
+from fivebar_sim.robots.floor import load
 from fivebar_sim.robots.measure import Trunk, heading, lean
 from fivebar_sim.robots.scenario import RobotScenario
 from fivebar_sim.runs.stored import StoredRun
@@ -151,7 +152,9 @@ def forces(run: StoredRun) -> Drawn:
         ax.set(ylabel=f"{leg} [N]", ylim=(0.0, top))
         cut |= axes.mark_cut(ax, run, line)
 
-    weight = robot_of(run).mass * 9.81
+    scene = run.scenario.scene
+    carried = load(scene) if isinstance(scene, Floor) else 0.0
+    weight = (robot_of(run).mass + carried) * 9.81
     share = ", ".join(
         f"{leg} {_percent(look_up(run.metrics, f'legs.{leg}.weight_share'))}" for leg in LEGS
     )

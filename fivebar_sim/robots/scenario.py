@@ -15,7 +15,7 @@ from fivebar_sim.files import presets, tables
 from fivebar_sim.files.tables import Table
 from fivebar_sim.metrics.catalogue import GROUND_KEYS, JUMP_KEYS, ROBOT_KEYS, ROBOTS
 from fivebar_sim.metrics.guards import Guards
-from fivebar_sim.robots.floor import KINDS, Air, Floor
+from fivebar_sim.robots.floor import KINDS, Air, Floor, Payload
 from fivebar_sim.robots.floor import Scene as Stage
 from fivebar_sim.robots.gait import PHASES, Gait
 from fivebar_sim.robots.ground import KINDS as GROUNDS
@@ -187,13 +187,14 @@ def _scene(value: Any, where: str) -> Stage:
     kind = own["kind"]
     if not isinstance(kind, str) or kind not in KINDS:
         raise ConfigError(f"{where}: {unknown('scene of a robot', str(kind), KINDS)}")
-    lying = own.get("ground")
-    if KINDS[kind] is not Floor or lying is None:
+    if KINDS[kind] is not Floor:
         return tables.convert(own, KINDS[kind], "scene", where)
 
-    rest = {key: part for key, part in own.items() if key != "ground"}
+    rest = dict(own)
+    ground = _ground(rest.pop("ground", "flat"), where)
+    payload = tables.convert(rest.pop("payload", {}), Payload, "scene.payload", where)
     floor = tables.convert(rest, Floor, "scene", where)
-    return msgspec.structs.replace(floor, ground=_ground(lying, where))
+    return msgspec.structs.replace(floor, ground=ground, payload=payload)
 
 
 def _ground(value: Any, where: str) -> Ground:

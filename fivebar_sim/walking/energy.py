@@ -15,6 +15,7 @@ from fivebar_sim.metrics.columns import motors
 from fivebar_sim.metrics.energy import STILL, Balance
 from fivebar_sim.robots import LEGS, Floor
 from fivebar_sim.robots.columns import FORCE_COLUMNS, of_leg
+from fivebar_sim.robots.floor import load
 from fivebar_sim.walking.walk import Walk, before, wrench
 
 
@@ -37,7 +38,9 @@ def balance(went: Walk) -> Balance:
 
     start = planned.start
     moved = np.abs(went.states.qpos[0] - start).max() > STILL
-    weight = planned.robot.mass * float(np.linalg.norm(planned.model.opt.gravity))
+    weight = (planned.robot.mass + load(planned.scene)) * float(
+        np.linalg.norm(planned.model.opt.gravity)
+    )
     return Balance(
         motor=h * np.sum(torque * turning, axis=1),
         force=np.zeros(len(v)),

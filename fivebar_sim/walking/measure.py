@@ -18,6 +18,7 @@ from fivebar_sim.metrics.sharing import Load
 from fivebar_sim.robots import LEGS, Floor, places, together
 from fivebar_sim.robots import measured as robots
 from fivebar_sim.robots.columns import of_leg
+from fivebar_sim.robots.floor import load
 from fivebar_sim.robots.ground import Flat
 from fivebar_sim.robots.measure import measure as how_it_moved
 from fivebar_sim.robots.measured import LegsTable, LegTable, RobotTable
@@ -209,7 +210,7 @@ def _robot(went: Walk, legs: list[Leg]) -> RobotTable | msgspec.UnsetType:
     moved = how_it_moved(went.trunk, window, robot.length, len(went.falls))
     seconds = planned.sim.timestep * (window.stop - window.start)
     way = abs(moved.speed) * seconds
-    weight = robot.mass * float(np.linalg.norm(planned.model.opt.gravity))
+    weight = (robot.mass + load(planned.scene)) * float(np.linalg.norm(planned.model.opt.gravity))
 
     cost = electric = None
     if way > NOWHERE * robot.length and weight > 0.0:
