@@ -296,12 +296,16 @@ ROBOTS = (
     Metric("robot.lean", "trunk leans up to", DEGREES, "deg", tolerance=1e-3, less_is_better=True),
     Metric("robot.bob", "trunk bobs by", 1e3, "mm", tolerance=1e-5, less_is_better=True),
     Metric("robot.falls", "falls", 1.0, "", tolerance=0.5, less_is_better=True, window=RUN),
+    Metric("robot.recovery", "up again after", 1.0, "s", 1e-2, less_is_better=True, window=RUN),
     Metric("robot.jump_height", "jump height", 1.0, "m", tolerance=1e-3, window=RUN),
     Metric("robot.agility", "jump agility", 1.0, "m/s", tolerance=5e-3, window=RUN),
     Metric("robot.cost_of_transport", "cost of transport", 1.0, ""),
     Metric("robot.cost_of_transport_electric", "the same with heat", 1.0, ""),
 )
 """The metrics that only a robot has."""
+
+PUSH_KEYS = ("robot.recovery",)
+"""The metrics of a robot that is pushed."""
 
 JUMP_KEYS = ("robot.jump_height", "robot.agility")
 """The metrics of a robot whose path does not repeat."""

@@ -5,6 +5,8 @@ The structure lives in models/robots/ and models/leg.xml; nothing here rebuilds 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import mujoco
 import numpy as np
 
@@ -19,6 +21,7 @@ from fivebar_sim.robots import LEGS, Air, Floor, Robot, Scene
 from fivebar_sim.robots.floor import Payload
 from fivebar_sim.robots.ground import Ground
 from fivebar_sim.robots.places import in_trunk
+from fivebar_sim.robots.push import Push
 
 BACKWARD = (0.0, 0.0, 0.0, 1.0)
 """Half a turn about z, as a quaternion."""
@@ -40,6 +43,7 @@ def build_robot(
     timestep: float | None = None,
     integrator: Integrator = "discrete",
     drive: Drive = "position",
+    pushes: Sequence[Push] = (),
 ) -> mujoco.MjModel:
     """Return the compiled model of a robot, its loops closed in the legs' rest pose.
 
@@ -56,13 +60,16 @@ def build_robot(
         timestep: [s]; None: the one in the MJCF file.
         integrator: "discrete" or "implicitfast".
         drive: Whether ctrl is an angle or a torque.
+        pushes: Forces on the trunk: ctrl begins with x, y and z of each [N], whatever its time.
 
     Raises:
         ArgumentError: Unknown integrator or drive, a timestep that is not positive, or a scene that
             is none of a robot's.
         GeometryError: The legs do not reach below the trunk, or MuJoCo cannot compile them.
     """
-    spec = robot_spec(robot, scene, timestep=timestep, integrator=integrator, drive=drive)
+    spec = robot_spec(
+        robot, scene, timestep=timestep, integrator=integrator, drive=drive, pushes=pushes
+    )
     try:
         with quiet():
             return spec.compile()
@@ -79,6 +86,7 @@ def robot_spec(
     timestep: float | None = None,
     integrator: Integrator = "discrete",
     drive: Drive = "position",
+    pushes: Sequence[Push] = (),
 ) -> mujoco.MjSpec:
     """Return what `build_robot` compiles; its arguments and errors are the same."""
     scene = Floor() if scene is None else scene
@@ -95,6 +103,7 @@ def robot_spec(
             lay(spec, scene.ground)
             _carry(spec, robot, scene.payload)
         _weigh(spec, robot)
+        _push(spec, pushes)
         for name in LEGS:
             leg = leg_spec(
                 robot.leg,
@@ -106,7 +115,7 @@ def robot_spec(
             _attach(spec, leg, robot, name, scene)
 
         _place(spec, robot, scene, q)
-        _rest(spec, robot, scene, q, drive)
+        _rest(spec, robot, scene, q, drive, len(pushes))
     return spec
 
 
@@ -180,6 +189,24 @@ def _carry(spec: mujoco.MjSpec, robot: Robot, payload: Payload) -> None:
     )
 
 
+def _push(spec: mujoco.MjSpec, pushes: Sequence[Push]) -> None:
+    """Give every push a place on the trunk, and motors along the axes of the world."""
+    if pushes:
+        spec.worldbody.add_site(name="world")
+
+    for k, push in enumerate(pushes):
+        site = spec.body("trunk").add_site(name=f"push_{k}", pos=push.at)
+        for axis, gear in zip("xyz", np.eye(3), strict=True):
+            motor = spec.add_actuator(
+                name=f"{site.name}_{axis}",
+                trntype=mujoco.mjtTrn.mjTRN_SITE,
+                target=site.name,
+                refsite="world",
+                gear=[*gear, 0.0, 0.0, 0.0],
+            )
+            motor.set_to_motor()
+
+
 def _attach(spec: mujoco.MjSpec, leg: mujoco.MjSpec, robot: Robot, name: str, scene: Scene) -> None:
     """Fix a leg to the trunk, and measure the floor's force on its foot."""
     hip = robot.hips[name]
@@ -213,7 +240,9 @@ def _place(spec: mujoco.MjSpec, robot: Robot, scene: Scene, q: Array) -> None:
     spec.body("trunk").pos = (0.0, 0.0, height)
 
 
-def _rest(spec: mujoco.MjSpec, robot: Robot, scene: Scene, q: Array, drive: Drive) -> None:
+def _rest(
+    spec: mujoco.MjSpec, robot: Robot, scene: Scene, q: Array, drive: Drive, pushes: int
+) -> None:
     """Replace the legs' keyframes by one of the robot."""
     for key in list(spec.keys):
         spec.delete(key)
@@ -224,5 +253,5 @@ def _rest(spec: mujoco.MjSpec, robot: Robot, scene: Scene, q: Array, drive: Driv
     spec.add_key(
         name="stand" if free else "home",
         qpos=np.concatenate([trunk, np.tile(q, len(LEGS))]),
-        ctrl=np.tile(ctrl, len(LEGS)),
+        ctrl=np.concatenate([np.zeros(3 * pushes), np.tile(ctrl, len(LEGS))]),
     )

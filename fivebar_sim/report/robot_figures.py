@@ -92,6 +92,7 @@ def _contours(ax: Axes, run: StoredRun, body: Trunk) -> bool:
     scene = run.scenario.scene
     if not isinstance(scene, Floor) or scene.ground.level:
         return False
+
     reach = robot_of(run).length
     ends = [(line.min() - reach, line.max() + reach) for line in body.position[:, :2].T]
     x, y = np.meshgrid(*(np.linspace(low, high, FELT) for low, high in ends))
@@ -176,6 +177,8 @@ def pose(run: StoredRun, body: Trunk) -> Drawn:
     """Draw height, lean and heading of the trunk."""
     figure, panels = draw.panels(1, 1, 1, height=4.2)
     time = run.record["time"]
+    assert isinstance(run.scenario, RobotScenario)
+    pushes = run.scenario.pushes
     drawn = (
         ("height [mm]", 1e3 * body.position[:, 2], "ink"),
         ("lean [deg]", np.degrees(lean(body.quaternion)), "foot"),
@@ -184,6 +187,8 @@ def pose(run: StoredRun, body: Trunk) -> Drawn:
     for ax, (label, values, name) in zip(panels, drawn, strict=True):
         draw.line(ax, time, values, name)
         draw.shade_unmeasured(ax, run)
+        for push in pushes:
+            ax.axvspan(push.time, push.end, color=colour("force"), alpha=0.25, lw=0, label="push")
         ax.set(ylabel=label)
 
     table = run.metrics["robot"]
@@ -191,11 +196,16 @@ def pose(run: StoredRun, body: Trunk) -> Drawn:
         f"{word} {shown(f'robot.{key}', table[key])}"
         for word, key in (("leans up to", "lean"), ("bobs by", "bob"), ("turns by", "turn_rate"))
     )
+    shaded = ""
+    if pushes:
+        after = table["recovery"]
+        over = "never" if after is None else f"after {shown('robot.recovery', after)}"
+        shaded = f" Dark bands: pushes. It is up again {over}."
     return Drawn(
         "pose",
         "The trunk",
         f"Height of its origin, angle between its z axis and the vertical, and where it faces. In "
-        f"the measured time it {said}.",
+        f"the measured time it {said}.{shaded}",
         f"Lines of height, lean and heading over time; it {said}.",
         figure,
     )

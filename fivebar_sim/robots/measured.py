@@ -34,6 +34,8 @@ class RobotTable(Table, frozen=True):
             not repeat, and so is the next; unset in a gait. None where all feet never left the
             floor. See `jump.Jump`.
         agility: The same by the time that it took [m/s].
+        recovery: Time from the end of the last push until the trunk is up as before [s]; unset
+            without pushes, None where it fell or never was. See `push.recovery`.
     """
 
     speed: Number
@@ -47,6 +49,7 @@ class RobotTable(Table, frozen=True):
     cost_of_transport_electric: Amount
     jump_height: Amount | msgspec.UnsetType = msgspec.UNSET
     agility: Amount | msgspec.UnsetType = msgspec.UNSET
+    recovery: Amount | msgspec.UnsetType = msgspec.UNSET
 
 
 class LegTable(Table, frozen=True):

@@ -13,20 +13,27 @@ from fivebar_sim.control.sensors import Sensors
 from fivebar_sim.errors import ArgumentError, ConfigError, unknown
 from fivebar_sim.files import presets, tables
 from fivebar_sim.files.tables import Table
-from fivebar_sim.metrics.catalogue import GROUND_KEYS, JUMP_KEYS, ROBOT_KEYS, ROBOTS
+from fivebar_sim.metrics.catalogue import (
+    GROUND_KEYS,
+    JUMP_KEYS,
+    PUSH_KEYS,
+    ROBOT_KEYS,
+    ROBOTS,
+)
 from fivebar_sim.metrics.guards import Guards
 from fivebar_sim.robots.floor import KINDS, Air, Floor, Payload
 from fivebar_sim.robots.floor import Scene as Stage
 from fivebar_sim.robots.gait import PHASES, Gait
 from fivebar_sim.robots.ground import KINDS as GROUNDS
 from fivebar_sim.robots.ground import Ground
+from fivebar_sim.robots.push import Push
 from fivebar_sim.robots.robot import LEGS, Robot
 from fivebar_sim.scenario import Scenario, reading
 from fivebar_sim.scenario.together import check_window
 
 KEYS = (
     *("name", "robot", "scene", "duration", "path", "gait", "controller"),
-    *("sensors", "sim", "guards", "limits", "converge"),
+    *("sensors", "sim", "guards", "limits", "converge", "push"),
 )
 
 TRUNK_KEYS = tuple(metric.key for metric in ROBOTS)
@@ -44,12 +51,14 @@ class RobotScenario(Scenario, frozen=True, kw_only=True):
         phases: By what part of a period each leg is ahead of the path.
         strides: What the path's x is multiplied by for each leg; None: 1 for every leg.
         scene: What the robot stands on.
+        pushes: Forces on its trunk.
     """
 
     robot: Robot
     phases: dict[str, float]
     strides: dict[str, float] | None = None
     scene: Stage = Floor()
+    pushes: tuple[Push, ...] = ()
     known_limits: ClassVar[tuple[str, ...]] = ROBOT_KEYS
 
     def _fit(self) -> None:
@@ -94,6 +103,7 @@ class RobotScenario(Scenario, frozen=True, kw_only=True):
             "controller": controller,
             "controller_name": controller_name,
             "scene": scene,
+            "pushes": _pushes(table.get("push", []), where),
             "duration": duration,
             "sensors": tables.convert(table.get("sensors", {}), Sensors, "sensors", where),
             "sim": reading.sim(table.get("sim", {}), scene, where),
@@ -114,7 +124,10 @@ class RobotScenario(Scenario, frozen=True, kw_only=True):
             table.pop(key)
         changed = msgspec.structs.replace(self.robot, servo=self.servo)
         gait = {"phases": self.phases, "strides": self.strides or dict.fromkeys(LEGS, 1.0)}
-        return {"name": table.pop("name"), "robot": changed.table(), "gait": gait, **table}
+        own = {"name": table.pop("name"), "robot": changed.table(), "gait": gait, **table}
+        if self.pushes:
+            own["push"] = [msgspec.to_builtins(push) for push in self.pushes]
+        return own
 
 
 def read_robot(value: Any, where: str, folder: Path) -> Robot:
@@ -197,6 +210,13 @@ def _scene(value: Any, where: str) -> Stage:
     return msgspec.structs.replace(floor, ground=ground, payload=payload)
 
 
+def _pushes(value: Any, where: str) -> tuple[Push, ...]:
+    """Return the pushes of the tables [[push]]."""
+    if not isinstance(value, list):
+        raise ConfigError(f"{where}: push must be tables [[push]], got {value!r}")
+    return tuple(tables.convert(each, Push, f"push[{k}]", where) for k, each in enumerate(value))
+
+
 def _ground(value: Any, where: str) -> Ground:
     """Return what lies on a floor, of a kind's name, such as "rough", or of a table."""
     own = {"kind": value} if isinstance(value, str) else value
@@ -209,6 +229,23 @@ def _ground(value: Any, where: str) -> Ground:
     if not isinstance(kind, str) or kind not in GROUNDS:
         raise ConfigError(f"{where}: scene.ground: {unknown('ground', str(kind), GROUNDS)}")
     return tables.convert(own, GROUNDS[kind], "scene.ground", where)
+
+
+def _check_pushes(scenario: RobotScenario, *, held: bool) -> None:
+    """Raise unless every push acts on a trunk that is free, within the run."""
+    if scenario.pushes and held:
+        raise ConfigError("push needs a floor: in the scene 'air' the trunk is held")
+    # Half a step more is rounding.
+    end = scenario.duration + 0.5 * scenario.sim.timestep
+    for k, push in enumerate(scenario.pushes):
+        if not push.end <= end:
+            raise ConfigError(
+                f"push[{k}] must end within the run of {scenario.duration:g} s, got time + "
+                f"duration = {push.end:g} s"
+            )
+    for key in scenario.limits:
+        if key in PUSH_KEYS and not scenario.pushes:
+            raise ConfigError(f"limits.{key} needs a [[push]]: nothing pushes the robot")
 
 
 def _check_together(scenario: RobotScenario) -> None:
@@ -225,6 +262,7 @@ def _check_together(scenario: RobotScenario) -> None:
             "with speed and load is known of single legs only"
         )
     held = isinstance(scenario.scene, Air)
+    _check_pushes(scenario, held=held)
     for key in scenario.limits:
         if held and key in (*TRUNK_KEYS, *GROUND_KEYS):
             raise ConfigError(f"limits.{key} needs a floor: scene must be 'floor'")

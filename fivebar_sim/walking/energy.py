@@ -43,7 +43,7 @@ def balance(went: Walk) -> Balance:
     )
     return Balance(
         motor=h * np.sum(torque * turning, axis=1),
-        force=np.zeros(len(v)),
+        force=h * meter.pushed(w),
         ground=ground,
         constraints=h * np.sum(constraint * w, axis=1) - ground,
         step=h * meter.given_away(w),
@@ -56,7 +56,8 @@ def balance(went: Walk) -> Balance:
 
 def _motors(model: mujoco.MjModel) -> list[int]:
     """Return where the rates of the motors are in qvel, in the order of ctrl."""
-    joints = model.actuator_trnid[:, 0]
+    motors = model.actuator_trntype == mujoco.mjtTrn.mjTRN_JOINT.value
+    joints = model.actuator_trnid[motors, 0]
     return [int(model.jnt_dofadr[joint]) for joint in joints]
 
 
@@ -116,6 +117,23 @@ class _Meter:
                 mujoco.mj_comVel(model, data)
                 mujoco.mj_rne(model, data, 0, c)
             found[k] = -float((start - meant) @ rates)
+        return found
+
+    def pushed(self, w: Array) -> Array:
+        """Return the power of the pushes on the trunk in every step [W], (N,)."""
+        model = self._model
+        data = self._data
+        pushes = self._went.plan.pushes
+        jac = np.empty((3, model.nv))
+        found = np.zeros(len(w))
+
+        for k in np.flatnonzero(pushes.any(axis=1)):
+            data.qpos[:] = self._q[k]
+            mujoco.mj_kinematics(model, data)
+            mujoco.mj_comPos(model, data)
+            for i, force in enumerate(pushes[k].reshape(-1, 3)):
+                mujoco.mj_jacSite(model, data, jac, None, model.site(f"push_{i}").id)
+                found[k] += float(force @ (jac @ w[k]))
         return found
 
     def ground(self, w: Array) -> Array:

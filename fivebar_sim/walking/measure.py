@@ -22,6 +22,7 @@ from fivebar_sim.robots.floor import load
 from fivebar_sim.robots.ground import Flat
 from fivebar_sim.robots.measure import measure as how_it_moved
 from fivebar_sim.robots.measured import LegsTable, LegTable, RobotTable
+from fivebar_sim.robots.push import recovery
 from fivebar_sim.simulation import record as recorded
 from fivebar_sim.simulation.measure import Unrecorded, heating_of, load_of
 from fivebar_sim.walking import energy as whole_energy
@@ -226,6 +227,10 @@ def _robot(went: Walk, legs: list[Leg]) -> RobotTable | msgspec.UnsetType:
         cost_of_transport=cost,
         cost_of_transport_electric=electric,
     )
+    pushes = planned.scenario.pushes
+    if pushes:
+        over = recovery(went.trunk, pushes, fell=bool(went.falls))
+        table = msgspec.structs.replace(table, recovery=over)
     # The flights of a gait are no jumps.
     if planned.scenario.path.period is not None:
         return table

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import msgspec
@@ -18,6 +19,7 @@ from fivebar_sim.model.robot import standing_height
 from fivebar_sim.motion import Motion
 from fivebar_sim.paths import FootPath
 from fivebar_sim.robots import LEGS, Floor, Gait, Robot, Scene
+from fivebar_sim.robots.push import Push, forces
 from fivebar_sim.robots.scenario import RobotScenario
 from fivebar_sim.scenario import Scenario
 from fivebar_sim.simulation.plan import Plan, asked_setpoints, check_period, sent_setpoints
@@ -34,6 +36,7 @@ class RobotPlan(NamedTuple):
         start: qpos at t = 0: level, at rest, the lowest foot on the floor.
         setpoints: What reaches the motors in every step [rad], (N, 8); None where a feedback
             controller decides during the run.
+        pushes: Forces on the trunk in every step [N], (N, 3) for each push.
     """
 
     scenario: RobotScenario
@@ -41,6 +44,7 @@ class RobotPlan(NamedTuple):
     model: mujoco.MjModel
     start: Array
     setpoints: Array | None
+    pushes: Array
 
     @property
     def robot(self) -> Robot:
@@ -76,6 +80,7 @@ def plan(
     controller: Setpoints | Feedback | None = None,
     scene: Scene | None = None,
     sim: Sim | None = None,
+    pushes: Sequence[Push] = (),
 ) -> RobotPlan:
     """Return the plan of a robot, without simulating anything.
 
@@ -88,6 +93,7 @@ def plan(
             its defaults.
         scene: What the robot stands on; None: a floor with its defaults.
         sim: Timestep, integrator, seed; None: the defaults.
+        pushes: Forces on its trunk.
 
     Raises:
         UnreachableError: The path leaves the workspace of a leg; says which, when and where.
@@ -113,6 +119,7 @@ def plan(
             scene=Floor() if scene is None else scene,
             duration=duration,
             sim=Sim() if sim is None else sim,
+            pushes=tuple(pushes),
         )
     )
 
@@ -128,6 +135,7 @@ def plan_scenario(scenario: RobotScenario) -> RobotPlan:
         timestep=sim.timestep,
         integrator=sim.integrator,
         drive=getattr(scenario.controller, "drive", "position"),
+        pushes=scenario.pushes,
     )
     paths = scenario.gait.paths(robot)
     legs = tuple(_of_leg(scenario, paths[leg], leg, built) for leg in LEGS)
@@ -138,7 +146,8 @@ def plan_scenario(scenario: RobotScenario) -> RobotPlan:
 
     sent = [leg.setpoints for leg in legs if leg.setpoints is not None]
     table = np.concatenate(sent, axis=1) if sent else None
-    return RobotPlan(scenario, legs, built, start, table)
+    pushed = forces(scenario.pushes, scenario.steps, sim.timestep)
+    return RobotPlan(scenario, legs, built, start, table, pushed)
 
 
 def _of_leg(scenario: RobotScenario, path: FootPath, leg: str, built: mujoco.MjModel) -> Plan:

@@ -37,8 +37,9 @@ def steered(planned: RobotPlan) -> States:
 
     for k in range(0, steps, every):
         commands = _commands(planned, asked, k, latest)[:, : steps - k]
-        # One leg's motors beside the other's, as in ctrl.
-        parts.append(robot.advance(np.concatenate([*commands], axis=-1)[None]))
+        # Pushes, then one leg's motors beside the other's, as in ctrl.
+        pushes = planned.pushes[k : k + every]
+        parts.append(robot.advance(np.concatenate([pushes, *commands], axis=-1)[None]))
         if is_broken(parts[-1], slice(None)):
             break
         latest = _seen(parts[-1])

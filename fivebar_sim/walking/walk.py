@@ -61,7 +61,8 @@ def walk(planned: RobotPlan, watch: Watch | None = None) -> Walk:
     """
     if planned.setpoints is None:
         return of_states(planned, steered(planned))
-    states = simulate(planned.model, planned.start[None], planned.setpoints[None], watch=watch)
+    table = np.concatenate([planned.pushes, planned.setpoints], axis=1)
+    states = simulate(planned.model, planned.start[None], table[None], watch=watch)
     return of_states(planned, states)
 
 
@@ -75,7 +76,11 @@ def walk_all(plans: Sequence[RobotPlan], nthread: int = 1) -> list[Walk]:
     Raises:
         DivergedError: A simulation broke down; says which, and when.
     """
-    tables = [planned.setpoints for planned in plans if planned.setpoints is not None]
+    tables = [
+        np.concatenate([planned.pushes, planned.setpoints], axis=1)
+        for planned in plans
+        if planned.setpoints is not None
+    ]
     if len(tables) < len(plans):
         return [walk(planned) for planned in plans]
 
@@ -159,10 +164,11 @@ def _part(planned: RobotPlan, states: States, k: int) -> Part:
     """Return all steps of leg k, as if it were alone."""
     # The legs' joints are the last of the robot's, four each.
     joints = slice(4 * (k - len(LEGS)), 4 * (k + 1 - len(LEGS)) or None)
+    motors = slice(2 * (k - len(LEGS)), 2 * (k + 1 - len(LEGS)) or None)
     own = states._replace(
         qpos=states.qpos[..., joints],
         qvel=states.qvel[..., joints],
-        ctrl=states.ctrl[..., 2 * k : 2 * k + 2],
+        ctrl=states.ctrl[..., motors],
     )
     return Part(own, 0, planned.legs[k].start)
 
