@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from fivebar_sim import kinematics, units, workspace
-from fivebar_sim.arrays import Array, Bools, at
+from fivebar_sim.arrays import Array, Bools, at, largest_of_columns
 from fivebar_sim.errors import ArgumentError, SingularError, UnreachableError
 from fivebar_sim.geometry import FiveBar
 from fivebar_sim.kinematics.stops import (
@@ -236,7 +236,7 @@ def _continuous(leg: FiveBar, rest: Array, q: Array) -> Array:
     """
     q = np.unwrap(q, axis=0)
     q = in_turn(leg, rest, q, q[0])
-    return in_range(q, q.min(axis=0), q.max(axis=0))
+    return in_range(q, -largest_of_columns(-q), largest_of_columns(q))
 
 
 def _check_stops(leg: FiveBar, rest: Array, foot: Array, time: Array, q: Array) -> None:

@@ -237,13 +237,15 @@ def _works(
             record["ground_x"][rows] * (x + rolled) + record["ground_z"][rows] * (z + m.lift)
         )
 
-    joints = np.column_stack([m.lift, *m.w] if "hip_z" in record else m.w)
+    joints = (m.lift, *m.w) if "hip_z" in record else m.w
+    # Column by column: a sum over each short row by itself takes thirty times as long.
+    constraints = sum(steps.constraint[rows, i] * rate for i, rate in enumerate(joints))
     torque_A, torque_E = (record[name][rows] for name in TORQUE_COLUMNS)
     return _Works(
         motor=h * (torque_A * m.w[MOTOR_JOINTS[0]] + torque_E * m.w[MOTOR_JOINTS[1]]),
         force=force,
         ground=ground,
-        constraints=h * np.sum(steps.constraint[rows] * joints, axis=-1) - ground,
+        constraints=h * constraints - ground,
         step=h * _given_away(chain, m, pose),
         kinetic=np.diff(kinetic),
         potential=np.diff(potential),

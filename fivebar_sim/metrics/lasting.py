@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from fivebar_sim.arrays import Array, Bools
+from fivebar_sim.arrays import Array, Bools, largest_of_rows
 from fivebar_sim.metrics.columns import motors
 
 WITHIN = 1.0
@@ -30,7 +30,7 @@ def clipped(saturated: Bools, time: Array) -> Array:
     window = _window(time)
     if not saturated.any():
         return np.zeros(len(time))
-    return _worse(_sums(saturated, window)) / window
+    return largest_of_rows(_sums(saturated, window)) / window
 
 
 def chattering(record: Mapping[str, Array], command: int) -> Array:
@@ -48,20 +48,16 @@ def chattering(record: Mapping[str, Array], command: int) -> Array:
     window = _window(record["time"])
     # An RMS, as a single spike must not make all else look faint.
     steps = np.minimum(np.arange(1, len(torque) + 1), window)
-    squares = _sums(torque**2, window).mean(axis=1, keepdims=True) / steps[:, None]
-    loud = FAINT * np.sqrt(np.maximum(squares, 0.0))
+    squares = _sums(torque**2, window)
+    mean = (squares[:, 0] + squares[:, 1]) / 2.0 / steps
+    loud = FAINT * np.sqrt(np.maximum(mean, 0.0))
     # Whole commands apart: within a command a torque may ring without any chatter.
     d = np.zeros_like(torque)
     d[command:] = torque[command:] - torque[:-command]
-    d[np.abs(d) <= loud] = 0.0
+    d = np.where(np.abs(d) <= loud[:, None], 0.0, d)
     chatters = np.zeros(torque.shape, dtype=bool)
     chatters[command:] = d[command:] * d[:-command] < 0.0
-    return _worse(_sums(chatters, window)) / window
-
-
-def _worse(pair: Array) -> Array:
-    """Return the larger of each row of (N, 2): in a tenth of the time that `max` takes."""
-    return np.maximum(pair[:, 0], pair[:, 1])
+    return largest_of_rows(_sums(chatters, window)) / window
 
 
 def lone(values: Array, before: Array) -> Array:

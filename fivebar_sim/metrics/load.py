@@ -10,9 +10,16 @@ from typing import Any, NamedTuple
 
 import msgspec
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
-from fivebar_sim.arrays import Array, Bools, at, first_index
+from fivebar_sim.arrays import (
+    Array,
+    Bools,
+    at,
+    first_index,
+    largest_of_columns,
+    sum_of_columns,
+)
 from fivebar_sim.checks import check_number
 from fivebar_sim.dynamics import antagonism
 from fivebar_sim.errors import ArgumentError, FiveBarError
@@ -48,15 +55,60 @@ class _Steps(NamedTuple):
         torque: (tau_A, tau_E) [N m], (N, 2).
         work: Work of each motor [J], (N, 2).
         against: Whether one motor drove and the other braked in each step, (N,).
+        time: When each begins, from the window's start [s], (N,).
         peak: Largest |torque| of the window [N m].
-        timestep: [s].
     """
 
     torque: Array
     work: Array
     against: Bools
+    time: Array
     peak: float
-    timestep: float
+
+    def rows(self, which: NDArray[np.intp]) -> _Steps:
+        """Return some of the steps of the window."""
+        # By indices: a mask takes ten times as long over rows of two.
+        return _Steps(
+            self.torque[which], self.work[which], self.against[which], self.time[which], self.peak
+        )
+
+
+class _Sums(NamedTuple):
+    """Sums of torques over some steps, scaled by the largest so that no square underflows.
+
+    Attributes:
+        peak: Largest |torque| of them [N m].
+        first: Sum of |tau / peak| of A and of E, (2,).
+        second: Sum of (tau / peak)^2, (2,).
+        steps: How many they are.
+    """
+
+    peak: float
+    first: Array
+    second: Array
+    steps: int
+
+    @classmethod
+    def of(cls, tau: Array) -> _Sums:
+        """Return the sums of torques (N, 2), N at least 1."""
+        amount = np.abs(tau)
+        peak = float(amount.max())
+        if not peak > 0.0:
+            return cls(peak, np.zeros(2), np.zeros(2), len(tau))
+        part = amount / peak
+        return cls(peak, sum_of_columns(part), sum_of_columns(part**2), len(tau))
+
+    @property
+    def rms(self) -> Array:
+        """Root of the mean square of each motor's torque [N m], (2,)."""
+        return self.peak * np.sqrt(self.second / self.steps)
+
+    def share(self, sums: Array, floor: float) -> float | None:
+        """Return A's part of a pair of sums, or None if no torque is above `floor`."""
+        if not self.peak > floor:
+            return None
+        A, E = sums.tolist()
+        return A / (A + E)
 
 
 def measure(
@@ -115,11 +167,11 @@ def sharing(
     steps = _steps(torque, theta, timestep)
     rows = len(steps.torque)
     # All steps of the window first: their peak decides what counts as zero in any part of it.
-    found = Sharing(**msgspec.structs.asdict(_over(steps, np.ones(rows, dtype=bool))))
+    found = Sharing(**msgspec.structs.asdict(_over(steps)))
 
     if stance is not None:
         chosen = _mask(stance, rows)
-        part = _over(steps, chosen) if chosen.any() else UNDEFINED
+        part = _over(steps.rows(np.flatnonzero(chosen))) if chosen.any() else UNDEFINED
         found = msgspec.structs.replace(found, stance=part)
 
     if phase is not None:
@@ -185,20 +237,21 @@ def _steps(torque: ArrayLike, theta: ArrayLike, timestep: float) -> _Steps:
         )
 
     work = tau * np.diff(angles, axis=0)
-    return _Steps(tau, work, _against(work), float(np.abs(tau).max()), timestep)
+    time = float(timestep) * np.arange(len(tau), dtype=np.float64)
+    return _Steps(tau, work, _against(work), time, float(np.abs(tau).max()))
 
 
-def _over(steps: _Steps, chosen: Bools) -> Share:
-    """Return the measures over the chosen steps, of which there is at least one."""
-    tau = steps.torque[chosen]
-    work = steps.work[chosen]
-    against = steps.against & chosen
+def _over(steps: _Steps) -> Share:
+    """Return the measures over steps, of which there is at least one."""
+    work = steps.work
+    against = steps.against
     floor = TINY * steps.peak
-    rms = _rms(tau)
-    peak = np.abs(tau).max(axis=0)
+    sums = _Sums.of(steps.torque)
+    rms = sums.rms
+    peak = largest_of_columns(np.abs(steps.torque))
     # Positive work is driving, negative braking; their sum would hide both.
-    given = np.maximum(work, 0.0).sum(axis=0)
-    taken = np.minimum(work, 0.0).sum(axis=0)
+    given = sum_of_columns(np.maximum(work, 0.0))
+    taken = sum_of_columns(np.minimum(work, 0.0))
 
     works = [
         Work(positive=gain, negative=loss, net=gain + loss)
@@ -207,15 +260,15 @@ def _over(steps: _Steps, chosen: Bools) -> Share:
     return Share(
         torque_rms=_named(rms),
         torque_peak=_named(peak),
-        share_A=_share(tau, floor, 1),
-        thermal_share_A=_share(tau, floor, 2),
+        share_A=sums.share(sums.first, floor),
+        thermal_share_A=sums.share(sums.second, floor),
         peak_ratio=_ratio(peak, floor),
         rms_ratio=_ratio(rms, floor),
         work=Works(**dict(zip(MOTORS, works, strict=True))),
         opposing=Opposing(
-            fraction=float(steps.against[chosen].mean()),
-            first=float(steps.timestep) * int(np.argmax(against)) if against.any() else None,
-            energy=float(np.minimum(*np.abs(steps.work[against]).T).sum()),
+            fraction=float(against.mean()),
+            first=float(steps.time[np.argmax(against)]) if against.any() else None,
+            energy=float(np.minimum(*np.abs(work[against]).T).sum()),
         ),
     )
 
@@ -237,11 +290,16 @@ def _histogram(steps: _Steps, phase: ArrayLike, bins: int) -> Phase:
 
     # Always below bins: even the float before 1 does not round up to it.
     bin_of = (cycle * bins).astype(int)
-    parts = [steps.torque[bin_of == i] for i in range(bins)]
-    rms = [_named(_rms(part)) if len(part) else Motors(A=None, E=None) for part in parts]
+    # Sorted once, each bin's steps in their order, instead of a mask for each.
+    order = np.argsort(bin_of, kind="stable")
+    ends = np.cumsum(np.bincount(bin_of, minlength=bins))
+    parts = np.split(steps.torque[order], ends[:-1])
+    sums = [_Sums.of(part) if len(part) else None for part in parts]
+    rms = [Motors(A=None, E=None) if each is None else _named(each.rms) for each in sums]
+    floor = TINY * steps.peak
 
     return Phase(
-        share_A=[_share(part, TINY * steps.peak, 1) for part in parts],
+        share_A=[None if each is None else each.share(each.first, floor) for each in sums],
         torque_rms=Bins(A=[each.A for each in rms], E=[each.E for each in rms]),
     )
 
@@ -252,23 +310,6 @@ def _against(work: Array) -> Bools:
     amount = np.abs(work)
     real = amount > TINY * amount.max()
     return real[:, 0] & real[:, 1] & (np.signbit(work[:, 0]) != np.signbit(work[:, 1]))
-
-
-def _rms(tau: Array) -> Array:
-    """Return the root of the mean square of each column."""
-    # Scaled by the peak, so that no square underflows.
-    peak = float(np.abs(tau).max())
-    return peak * np.sqrt(np.mean((tau / peak) ** 2, axis=0)) if peak > 0.0 else np.zeros(2)
-
-
-def _share(tau: Array, floor: float, power: int) -> float | None:
-    """Return A's part of the sum of |tau|^power, or None if no torque is above `floor`."""
-    amount = np.abs(tau)
-    peak = float(amount.max(initial=0.0))
-    if not peak > floor:
-        return None
-    A, E = ((amount / peak) ** power).sum(axis=0).tolist()
-    return A / (A + E)
 
 
 def _ratio(pair: Array, floor: float) -> float | None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from fivebar_sim import dynamics, units
-from fivebar_sim.arrays import Array
+from fivebar_sim.arrays import Array, largest_of_rows
 from fivebar_sim.errors import ConfigError
 from fivebar_sim.metrics.columns import MOTORS
 from fivebar_sim.motion import Motion
@@ -29,7 +29,7 @@ def check(scenario: Scenario, wanted: Motion) -> None:
 
     torque = _holding(scenario, wanted)
     # A joint at rest sticks: its friction carries that much of the torque.
-    worst = np.abs(torque).max(axis=1) - scenario.servo.dry
+    worst = largest_of_rows(np.abs(torque)) - scenario.servo.dry
     k = int(np.argmax(worst))
     if worst[k] > limit:
         name = MOTORS[int(np.argmax(np.abs(torque[k])))]

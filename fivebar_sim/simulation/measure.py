@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import msgspec
 import numpy as np
 
-from fivebar_sim.arrays import Array, Bools
+from fivebar_sim.arrays import Array, Bools, sum_of_columns
 from fivebar_sim.control import Feedback
 from fivebar_sim.dynamics import creep, heat
 from fivebar_sim.errors import PoseError
@@ -220,6 +220,7 @@ def load_of(
         stance = phase < path.duty
 
     shared = load.sharing(torque[window], turned, h, stance=stance, phase=phase)
-    clipped = Parts(**by_motor(besides.saturated[window].mean(axis=0)))
+    clips = besides.saturated[window]
+    clipped = Parts(**by_motor(sum_of_columns(clips) / len(clips)))
     more = _warmth(heated) | _line(scenario, record)
     return Load(**msgspec.structs.asdict(shared), **more, saturated=clipped)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fivebar_sim import model, motion
-from fivebar_sim.arrays import Array
+from fivebar_sim.arrays import Array, largest_of_rows
 from fivebar_sim.control import Feedback, Setpoints
 from fivebar_sim.control.bus import Bus
 from fivebar_sim.control.interface import answer_of, is_numbers
@@ -167,7 +167,7 @@ def _check_near(scenario: Scenario, ctrl: NDArray[Any], wanted: Motion) -> None:
         ConfigError: Says which motor's, how far, and when.
     """
     away = np.abs(ctrl - wanted.q[1:, MOTOR_JOINTS])
-    far = away.max(axis=1) > FARTHEST
+    far = largest_of_rows(away) > FARTHEST
     if far.any():
         k = int(np.argmax(far))
         motor = int(np.argmax(away[k]))

@@ -8,7 +8,7 @@ import mujoco
 import numpy as np
 
 from fivebar_sim import dynamics, kinematics
-from fivebar_sim.arrays import Array, Bools, blocks
+from fivebar_sim.arrays import Array, Bools, blocks, largest_of_rows
 from fivebar_sim.control.servo import Drive, MotorStep, applied_torque
 from fivebar_sim.control.servo import saturated as clipped
 from fivebar_sim.dynamics import gears
@@ -166,7 +166,7 @@ def jolts(planned: Plan, record: Record) -> Array | None:
         found = np.maximum(found, _fed(planned, asked))
         found = np.maximum(found, _missed(planned, sent, torque))
     largest = max(float(np.abs(torque).max()), FAINTEST)
-    return found.max(axis=1) / largest
+    return largest_of_rows(found) / largest
 
 
 def _referred(planned: Plan) -> Array:
@@ -192,7 +192,7 @@ def _referred(planned: Plan) -> Array:
         )
 
     found = lasting.lone(needed, np.zeros(2))
-    worst = int(np.argmax(found.max(axis=1)))
+    worst = int(np.argmax(largest_of_rows(found)))
     used = sampling.accelerated(planned.scenario, wanted, worst + 1)
     return found if (2.0 * used > found[worst]).any() else np.zeros_like(found)
 

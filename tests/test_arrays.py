@@ -1,0 +1,31 @@
+"""Reductions over few columns: NumPy's bits, whatever the numbers are."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from fivebar_sim.arrays import Array, largest_of_columns, largest_of_rows, sum_of_columns
+
+
+def draws(rows: int, columns: int) -> Array:
+    """Return numbers of very different sizes: sums of them depend on their order."""
+    rng = np.random.default_rng(rows)
+    return rng.normal(size=(rows, columns)) * 10.0 ** rng.integers(-9, 9, size=(rows, columns))
+
+
+@pytest.mark.parametrize("rows", [1, 2, 9, 1000, 4097])
+@pytest.mark.parametrize("columns", [2, 4])
+def test_bits_are_those_of_numpy(rows: int, columns: int) -> None:
+    values = draws(rows, columns)
+    assert np.array_equal(sum_of_columns(values), values.sum(axis=0))
+    assert np.array_equal(largest_of_columns(values), values.max(axis=0))
+    assert np.array_equal(largest_of_rows(values), values.max(axis=-1))
+
+
+def test_nan_is_the_largest_of_all() -> None:
+    values = draws(9, 2)
+    values[4, 1] = np.nan
+    assert np.isnan(largest_of_rows(values)).tolist() == [k == 4 for k in range(9)]
+    assert np.isnan(largest_of_columns(values)).tolist() == [False, True]
+    assert np.isnan(sum_of_columns(values)).tolist() == [False, True]
