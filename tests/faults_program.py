@@ -69,7 +69,8 @@ def endless(right: Right, *args: Any) -> Any:
 
 
 def transposed(right: Right, *args: Any) -> Any:
-    return np.swapaxes(right(*args), -1, -2)
+    foot, jacobian = right(*args)
+    return foot, np.swapaxes(jacobian, -1, -2)
 
 
 def turned_over(right: Right, *args: Any) -> Any:
@@ -232,7 +233,11 @@ CONTROLLERS = (
     Fault(
         "impedance 10 % stiff", FORCE, around(Impedance, "command", own(stiffness=(220.0, 220.0)))
     ),
-    Fault("impedance's Jacobian turned over", FORCE, around(kinematics, "jacobian", transposed)),
+    Fault(
+        "impedance's Jacobian turned over",
+        FORCE,
+        around(kinematics, "foot_and_jacobian", transposed),
+    ),
     Fault(
         "payload unknown to the controller",
         "extended-gravity-hold",

@@ -23,6 +23,7 @@ NAMES = sorted(name for name in resources.shipped("scenarios") if not name.start
 SCENARIOS = {name: Scenario.load(name) for name in NAMES}
 
 
+@cache
 def shortened(name: str) -> Scenario:
     """Return a scenario with the shortest run that is measured at all: its ramp and a period."""
     path = SCENARIOS[name].path

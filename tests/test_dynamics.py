@@ -227,6 +227,9 @@ def test_batch_is_a_plain_loop_to_the_last_bit(rng: np.random.Generator) -> None
     for law, given in laws:
         rows = [law(HEAVY, *row) for row in zip(*given, strict=True)]
         np.testing.assert_array_equal(law(HEAVY, *given), rows)
+        # as controllers ask, which is answered in plain numbers
+        single = [law(HEAVY, *(each[k : k + 1] for each in given)) for k in range(len(theta))]
+        np.testing.assert_array_equal(law(HEAVY, *given), np.concatenate(single))
     rows = [dynamics.energy(HEAVY, *row) for row in zip(theta, w, strict=True)]
     np.testing.assert_array_equal(np.transpose(dynamics.energy(HEAVY, theta, w)), rows)
 
@@ -292,6 +295,10 @@ def test_singular_and_open_poses_name_the_first_index() -> None:
     with pytest.raises(LoopOpenError, match="in 1 of 2 poses") as opened:
         dynamics.inverse(RIGHT, [(-1.85, -1.28), IN_LINE], still, still)
     assert opened.value.index == (1,)
+    for leg, error in ((LINE, SingularError), (RIGHT, LoopOpenError)):
+        with pytest.raises(error) as first:
+            dynamics.inverse(leg, [IN_LINE], still, still)
+        assert first.value.index == (0,)
 
 
 def test_bad_arguments_are_refused() -> None:

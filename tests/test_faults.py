@@ -79,6 +79,7 @@ def test_fault_breaks_the_baseline(monkeypatch: pytest.MonkeyPatch, fault: Fault
 @pytest.mark.parametrize(
     "fault", [fault for fault in FAULTS if fault.what in WHOLE], ids=attrgetter("what")
 )
+@pytest.mark.usefixtures("light")
 def test_fault_turns_the_check_red(
     shell: Shell, monkeypatch: pytest.MonkeyPatch, fault: Fault
 ) -> None:

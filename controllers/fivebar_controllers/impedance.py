@@ -57,8 +57,7 @@ class Impedance(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only
         del servo  # the motors are driven in torque
         theta = seen.theta
         rate = seen.theta_dot
-        J = kinematics.jacobian(leg, theta)
-        p = kinematics.forward(leg, theta)
+        p, J = kinematics.foot_and_jacobian(leg, theta)
         p_dot = J[..., 0] * rate[..., :1] + J[..., 1] * rate[..., 1:]
         spring = np.asarray(self.stiffness) * (wanted.foot - p)
         pull = spring + np.asarray(self.damping) * (wanted.foot_dot - p_dot)

@@ -186,15 +186,30 @@ class Chain:
             LoopOpenError: The links do not meet.
             SingularError: B, C and D are in line.
         """
+        # NumPy's functions take twenty times as long for one number as those of math.
+        maths: Any = math if isinstance(theta_A, float) else np
+        e1 = maths.cos(theta_A), maths.sin(theta_A)
+        e4 = maths.cos(theta_E), maths.sin(theta_E)
+        return self._pose(e1, e4, theta_A, theta_E)
+
+    def pose_of_one(self, theta: Array) -> Pose:
+        """Return what `pose` does of one pose (1, 2) among possibly many [rad], as plain numbers.
+
+        They have the bits that `pose` gives of arrays, whose cosines are NumPy's.
+        """
+        theta_A = theta[:, 0]
+        theta_E = theta[:, 1]
+        e1 = np.cos(theta_A).item(), np.sin(theta_A).item()
+        e4 = np.cos(theta_E).item(), np.sin(theta_E).item()
+        return self._pose(e1, e4, theta_A, theta_E)
+
+    def _pose(self, e1: Vector, e4: Vector, theta_A: Scalar, theta_E: Scalar) -> Pose:
+        """Return the closed pose of the directions of L1 and L4; errors name the angles."""
         leg = self.leg
         L1 = leg.L1
         L2 = leg.L2
         L3 = leg.L3
         L4 = leg.L4
-        # NumPy's functions take twenty times as long for one number as those of math.
-        maths: Any = math if isinstance(theta_A, float) else np
-        e1 = maths.cos(theta_A), maths.sin(theta_A)
-        e4 = maths.cos(theta_E), maths.sin(theta_E)
         # BD = (x, z).
         x = self.AE[0] + L4 * e4[0] - L1 * e1[0]
         z = self.AE[1] + L4 * e4[1] - L1 * e1[1]
@@ -207,7 +222,8 @@ class Chain:
             self._check_regular(theta_A, theta_E)
 
         along = (d2 + (L2 - L3) * (L2 + L3)) / (2.0 * d2)
-        across = self.assembly * maths.sqrt(area) / (2.0 * d2)
+        root = math.sqrt(area) if isinstance(area, float) else np.sqrt(area)
+        across = self.assembly * root / (2.0 * d2)
         # From BD to BC by rotating and scaling, so that L2 and L3 need no trigonometry.
         BC = along * x - across * z, along * z + across * x
         e2 = BC[0] / L2, BC[1] / L2

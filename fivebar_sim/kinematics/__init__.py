@@ -17,7 +17,7 @@ from fivebar_sim.kinematics.closure import (
 )
 from fivebar_sim.kinematics.half_angle import inverse_half_angle, inverse_within
 from fivebar_sim.kinematics.home import hanging, home
-from fivebar_sim.kinematics.rates import JointMotion, jacobian, joint_motion
+from fivebar_sim.kinematics.rates import JointMotion, foot_and_jacobian, jacobian, joint_motion
 from fivebar_sim.kinematics.reach import inverse, inverse_all, inverse_nearest
 
 __all__ = [
@@ -28,6 +28,7 @@ __all__ = [
     "branch",
     "chain_points",
     "closed_points",
+    "foot_and_jacobian",
     "forward",
     "hanging",
     "home",

@@ -54,6 +54,18 @@ def jacobian(leg: FiveBar, theta: ArrayLike, assembly: int | None = None) -> Arr
         LoopOpenError: The links do not meet.
         SingularError: B, C and D are in line (BC x DC = 0), so the foot's velocity is infinite.
     """
+    return foot_and_jacobian(leg, theta, assembly)[1]
+
+
+def foot_and_jacobian(
+    leg: FiveBar, theta: ArrayLike, assembly: int | None = None
+) -> tuple[Array, Array]:
+    """Return what `forward` and `jacobian` do, in less time than both.
+
+    Raises:
+        LoopOpenError: The links do not meet.
+        SingularError: B, C and D are in line.
+    """
     A, E = bases(leg)
     p = closed_points(leg, theta, assembly=assembly)
     AB = p.B - A
@@ -73,7 +85,7 @@ def jacobian(leg: FiveBar, theta: ArrayLike, assembly: int | None = None) -> Arr
     dF_A = dC_A + psi_A[..., None] * perp(CF)
     dF_E = dC_E + psi_E[..., None] * perp(CF)
 
-    return np.stack([dF_A, dF_E], axis=-1)
+    return p.F, np.stack([dF_A, dF_E], axis=-1)
 
 
 def joint_motion(
