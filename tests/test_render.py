@@ -152,6 +152,25 @@ def test_ground_pushes_the_foot_with_an_arrow() -> None:
 
 
 @pytest.mark.usefixtures("drawing")
+def test_pictures_share_a_context_and_nothing_else() -> None:
+    """Drawn in turns, and after one of them is gone: each as it is drawn alone."""
+    legs = [FiveBar.load(name) for name in ("classic", "doggo")]
+    sizes = [(64, 64), (96, 80)]
+    alone = []
+    for leg, size in zip(legs, sizes, strict=True):
+        with render.stage(posed(leg, "rail"), *size) as drawn:
+            alone.append(drawn.frame(0.1))
+
+    with render.stage(posed(legs[0], "rail"), *sizes[0]) as first:
+        with render.stage(posed(legs[1], "rail"), *sizes[1]) as second:
+            for _ in range(2):
+                np.testing.assert_array_equal(first.frame(0.1), alone[0])
+                np.testing.assert_array_equal(second.frame(0.1), alone[1])
+        np.testing.assert_array_equal(first.frame(0.1), alone[0])
+    assert gl.context() is gl.context()
+
+
+@pytest.mark.usefixtures("drawing")
 @pytest.mark.parametrize("name", ["classic", "minitaur"])
 def test_letters_scale_and_time_are_in_a_picture(name: str) -> None:
     """A stands left of its motor in blue, E right of its own in orange, also where both are one."""

@@ -139,7 +139,7 @@ def write(replay: Replay, out: Path, film: Film) -> int:
 
 
 class Stage:
-    """A GL context with a scene and a camera, which draws the moments of a run with a caption.
+    """A scene and a camera, which draw the moments of a run with a caption.
 
     Args:
         replay: The run.
@@ -163,17 +163,13 @@ class Stage:
         self._option = mujoco.MjvOption()
         self._view = mujoco.MjvCamera()
         self.camera.aim(self._view)
-        self._gl = gl.context(gl.find(), width, height)
+        self._gl = gl.context()
 
         try:
             self._gl.make_current()
             self._mjr = mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_100)
         except mujoco.FatalError as error:
-            self._gl.free()
             raise ConfigError(f"cannot draw {width} x {height} pixels here: {error}") from None
-
-        # The default target is a window, and there is none.
-        mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN, self._mjr)
 
     def frame(self, time: float) -> Frame:
         """Return the picture of the run at a time [s], (height, width, 3)."""
@@ -187,8 +183,9 @@ class Stage:
         every = mujoco.mjtCatBit.mjCAT_ALL
         mujoco.mjv_updateScene(model, data, self._option, None, self._view, every, self.scene)
         scene.decorate(self.scene, self._replay, row, here.eye)
-        # Another stage of this thread may have made its own context current since.
+        # Another picture of this thread, or another library, may have drawn since.
         self._gl.make_current()
+        mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN, self._mjr)
         mujoco.mjr_render(self._rect, self.scene, self._mjr)
         pixels = np.empty((self._rect.height, self._rect.width, 3), np.uint8)
         mujoco.mjr_readPixels(pixels, None, self._rect, self._mjr)
@@ -197,9 +194,9 @@ class Stage:
         return self._caption.write(np.ascontiguousarray(pixels[::-1]), row)
 
     def close(self) -> None:
-        """Free the GL context."""
+        """Free what the scene holds in the GL context."""
+        self._gl.make_current()
         self._mjr.free()
-        self._gl.free()
 
 
 @contextmanager

@@ -6,10 +6,12 @@ needs a screen. Here the choice is made when a context is requested.
 
 from __future__ import annotations
 
+import atexit
 import importlib
 import os
 import subprocess
 import sys
+import threading
 from functools import cache
 from typing import Any
 
@@ -82,26 +84,55 @@ def find() -> str:
     )
 
 
-def context(way: str, width: int, height: int) -> Any:
-    """Return MuJoCo's GL context, an object with make_current and free.
+def context() -> Any:
+    """Return this thread's GL context, an object with make_current; all its pictures share it.
 
-    Args:
-        way: What `find` returned.
-        width: Width of the pictures [pixels].
-        height: Height of the pictures [pixels].
+    In a context of its own each of them would compile its shaders anew: in software that takes ten
+    times as long as to draw. MuJoCo draws into a buffer of the picture's size, whatever the size
+    of the context. Make it current, and the picture's buffer the target, before each use.
 
     Raises:
-        ConfigError: OpenGL was already loaded with another platform, as dm_control may do.
+        ConfigError: There is no working GL, or OpenGL was already loaded with another platform, as
+            dm_control may do.
     """
+    # A forked process makes its own: the driver's threads have stayed behind.
+    key = (os.getpid(), find())
+    if key not in _HELD.contexts:
+        _HELD.contexts[key] = _made(key[1])
+    return _HELD.contexts[key]
+
+
+class _Held(threading.local):
+    """The contexts of a thread: in two threads at once none can be current."""
+
+    def __init__(self) -> None:
+        self.contexts: dict[tuple[int, str], Any] = {}
+
+
+_HELD = _Held()
+
+
+def _made(way: str) -> Any:
+    """Return a new context; the process frees it at its end."""
     module = "mujoco.gl_context" if way == "native" else f"mujoco.{way}"
     try:
         # The import loads OpenGL for this platform, which a process can do only once.
-        return importlib.import_module(module).GLContext(width, height)
+        made = importlib.import_module(module).GLContext(64, 64)
     except ImportError as error:
         raise ConfigError(
             f"cannot draw: OpenGL is already loaded for another platform than {way}; set "
             f"MUJOCO_GL={way} before anything is imported"
         ) from error
+
+    # Registered after that import, so it runs before MuJoCo shuts GL down; `__del__` is too late.
+    atexit.register(_free, made, os.getpid())
+    return made
+
+
+def _free(made: Any, owner: int) -> None:
+    """Free a context, unless this is a fork of the process that made it."""
+    if os.getpid() == owner:
+        made.free()
 
 
 def set_mujoco_gl() -> None:

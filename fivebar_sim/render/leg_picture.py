@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import copy
-import weakref
 
 import msgspec
 import mujoco
@@ -55,7 +54,7 @@ class Camera(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
 
 
 class LegPicture:
-    """A GL context with a scene and a camera, which takes pictures of a leg.
+    """A scene and a camera, which take pictures of a leg.
 
     Args:
         model: The leg's model.
@@ -93,19 +92,13 @@ class LegPicture:
         self._camera.azimuth = camera.azimuth
         self._camera.elevation = camera.elevation
         self._camera.distance = camera.distance or FAR * leg.size
-        self._gl = gl.context(gl.find(), width, height)
-        # A finalizer runs before Python unloads its modules; `__del__` may come too late for GL.
-        self._free = weakref.finalize(self, self._gl.free)
+        self._gl = gl.context()
 
         try:
             self._gl.make_current()
             self._mjr = mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_100)
         except mujoco.FatalError as error:
-            self._free()
             raise ConfigError(f"cannot draw {width} x {height} pixels here: {error}") from None
-
-        # The default target is a window, and there is none.
-        mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN, self._mjr)
 
     def take(self, qpos: Array) -> NDArray[np.uint8]:
         """Return the picture of a pose (nq,), (height, width, 3)."""
@@ -119,7 +112,9 @@ class LegPicture:
         mujoco.mjv_updateScene(
             self._model, self._data, self._option, None, self._camera, every, self._scene
         )
+        # Another picture of this thread, or another library, may have drawn since.
         self._gl.make_current()
+        mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN, self._mjr)
         mujoco.mjr_render(self._rect, self._scene, self._mjr)
         pixels = np.empty((self._rect.height, self._rect.width, 3), np.uint8)
         mujoco.mjr_readPixels(pixels, None, self._rect, self._mjr)
@@ -128,6 +123,6 @@ class LegPicture:
         return np.ascontiguousarray(pixels[::-1])
 
     def close(self) -> None:
-        """Free the GL context."""
+        """Free what the scene holds in the GL context."""
+        self._gl.make_current()
         self._mjr.free()
-        self._free()
