@@ -21,7 +21,7 @@ SCENES = {
     "stand": "rail-hop",
     "gait": "treadmill-trot",
 }
-SHORT = ("duration=0.35", "path.frequency=4.0", "path.ramp=0.1")
+SHORT = ("duration=0.175", "path.frequency=8.0", "path.ramp=0.05")
 
 
 class Played(msgspec.Struct, frozen=True, kw_only=True):
@@ -37,7 +37,7 @@ class Played(msgspec.Struct, frozen=True, kw_only=True):
 
 
 def scenario(kind: str, *settings: str) -> Scenario:
-    """Return the scenario of a task, 0.35 s of it."""
+    """Return the scenario of a task, 0.175 s of it."""
     return Scenario.load(SCENES[kind], [*SHORT, *settings])
 
 
