@@ -2,10 +2,12 @@
 
 Each page, README.md and docs/, has a folder of its own with a copy of the checkout. There its `sh`
 and `console` blocks run in a shell, in order, and its `python` blocks as one program; a block with
-title="FILE" becomes that file first. What a command prints must hold the lines that a page shows of
-it, in order; ... in a line is whatever is left out. Numbers of three digits and more may be off by
-one in the last digit shown, others must round to it; below 1e-8 they are rounding errors, and may
-be ten times as large. A comment before a block, a table or a paragraph says more:
+title="FILE" becomes that file first. A block of nothing but plain `fivebar ...` needs no shell:
+outside of README.md its lines call the main function, which saves what a new program takes to
+import. What a command prints must hold the lines that a page shows of it, in order; ... in a line
+is whatever is left out. Numbers of three digits and more may be off by one in the last digit shown,
+others must round to it; below 1e-8 they are rounding errors, and may be ten times as large. A
+comment before a block, a table or a paragraph says more:
 
     <!-- printed by: COMMAND -->          the block or table is what COMMAND prints ("python": the
                                           page's program); a COMMAND with {1}, the first cell, runs
@@ -58,6 +60,15 @@ COPIED = (
 CODE = re.compile(r"`[^`]+`")
 DECIMAL = re.compile(r"\d\.\d")
 
+SHELL = set("$|&;<>()`*?~")
+"""What only a shell understands: a line without these is a list of words."""
+
+PROGRAM = [["fivebar"], [".venv/bin/fivebar"]]
+"""How pages call it."""
+
+PLAIN = {"COLUMNS": "80", "NO_COLOR": "1"}
+"""What commands are told of the terminal, which is none."""
+
 
 class Printed(NamedTuple):
     """What came of a command."""
@@ -86,12 +97,29 @@ def compare_row(labels: list[str], row: list[str], came: Printed) -> None:
         raise WrongError("shows " + "; ".join(wrong))
 
 
+def joined(script: str) -> list[str]:
+    """Return the commands of a script, one each; a backslash at the end of a line goes on."""
+    lines = script.replace("\\\n", " ").splitlines()
+    return [line for line in lines if line.strip() and not line.startswith("#")]
+
+
+def fivebar_args(line: str) -> list[str] | None:
+    """Return the arguments of a line that only calls `fivebar`; None of any other."""
+    try:
+        words = shlex.split(line, comments=True)
+    except ValueError:  # a quote that ends in another line
+        return None
+
+    return None if SHELL & set(line) or words[:1] not in PROGRAM else words[1:]
+
+
 class Page:
     """A page's folder, and what was run in it."""
 
-    def __init__(self, text: str, folder: Path, *, long: bool) -> None:
+    def __init__(self, text: str, folder: Path, *, long: bool, quick: bool = True) -> None:
         self.folder = folder
         self.long = long
+        self.quick = quick
         self.items = list(items(text))
         self.outputs: dict[str, Printed] = {}
         self.ran = self.compared = self.left = 0
@@ -132,7 +160,7 @@ class Page:
         done = subprocess.run(
             ["bash", "-eu", "-c", script],
             cwd=self.folder,
-            env={**os.environ, "PATH": path, "COLUMNS": "80", "NO_COLOR": "1"},
+            env={**os.environ, **PLAIN, "PATH": path},
             stdin=subprocess.DEVNULL,
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
@@ -143,13 +171,31 @@ class Page:
         return Printed(done.returncode, done.stdout)
 
     def command(self, line: str) -> Printed:
-        """Run one command; `fivebar` by its main function, which saves what it takes to import."""
-        name, *args = shlex.split(line)
+        """Run one command."""
+        args = fivebar_args(line)
         if line == "python":
             return self.shell("python page.py")
-        if Path(name).name != "fivebar":
-            return self.shell(line)
+        return self.shell(line) if args is None else self.fivebar(args)
 
+    def block(self, script: str) -> Printed:
+        """Run the lines of a block, until one fails."""
+        lines = [fivebar_args(line) for line in joined(script)]
+        if None in lines or not self.quick:
+            return self.shell(script)
+
+        said = ""
+        status = 0
+        for args in lines:
+            came = self.fivebar(args or [])
+            said += came.text
+            status = came.status
+            if status:
+                break
+
+        return Printed(status, said)
+
+    def fivebar(self, args: list[str]) -> Printed:
+        """Call the main function of `fivebar`."""
         from fivebar_sim import cli
 
         self.ran += 1
@@ -196,7 +242,7 @@ class Page:
             shown = re.sub(r"^\$ .*", "", item.text, flags=re.M)
             self.compared += 1
 
-        came = self.shell(script)
+        came = self.block(script)
         if came.status != wanted:
             raise WrongError(f"ends with status {came.status}, not {wanted}:\n{came.text}")
 
@@ -242,7 +288,8 @@ def check_page(name: str, *, long: bool) -> tuple[str, list[str]]:
     wrong = []
     with tempfile.TemporaryDirectory(prefix="docs-") as folder:
         try:
-            page = Page((ROOT / name).read_text(encoding="utf-8"), Path(folder), long=long)
+            text = (ROOT / name).read_text(encoding="utf-8")
+            page = Page(text, Path(folder), long=long, quick=name != "README.md")
         except WrongError as error:
             return f"{name}: not read", [f"{name}: {error}"]
         if any(item.kind in ("sh", "console", "python") or item.note for item in page.items):
@@ -266,6 +313,7 @@ def main() -> int:
     found = sorted((ROOT / "docs").rglob("*.md"), key=lambda path: -path.stat().st_size)
     names = options.pages or ["README.md", *(str(path.relative_to(ROOT)) for path in found)]
     failed = False
+    os.environ.update(PLAIN)
 
     with ProcessPoolExecutor() as pool:
         for job in [pool.submit(check_page, name, long=options.long) for name in names]:

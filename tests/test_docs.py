@@ -171,6 +171,8 @@ def test_a_page_that_is_so(wrong: Any) -> None:
         ("<!-- long: slow -->\n\n```sh\nfalse\n```", "ends with status 1, not 0"),
         ("<!-- status: 1 -->\n\n```sh\ntrue\n```", "ends with status 0, not 1"),
         ("```console\n$ echo 1.5\n1.7\n```", "1.7"),
+        ("```sh\nfivebar check nothing.toml\ntouch here\n```", "nothing.toml: No such file"),
+        ("```sh\n.venv/bin/fivebar \\\n  check nothing.toml # this\n```", "ends with status 2"),
         ("```python\n1 / 0\n```", "line 2, in <module>"),  # the page's own line
         ("```text\n1.5 mm\n```", "no comment says what prints them"),
         ("| a |\n| --- |\n| 1.5 |", "no comment says what prints them"),
@@ -185,6 +187,31 @@ def test_a_page_that_is_so(wrong: Any) -> None:
 def test_a_page_that_is_not_so(wrong: Any, page: str, said: str) -> None:
     (found,) = wrong(page, long=True)
     assert said in found
+
+
+@pytest.mark.parametrize(
+    ("line", "args"),
+    [
+        ('.venv/bin/fivebar run a --set "x=[0, 1]"  # why', ["run", "a", "--set", "x=[0, 1]"]),
+        ("fivebar run a > log", None),
+        ("fivebar run a --set leg=$PWD/b.toml", None),
+        ("X=1 fivebar run a", None),
+        ("./fivebar run a", None),
+        ("fivebar run 'a", None),
+        ("# fivebar run a", None),
+    ],
+)
+def test_what_needs_no_shell(script: dict[str, Any], line: str, args: list[str] | None) -> None:
+    assert script["fivebar_args"](line) == args
+
+
+def test_plain_commands_are_called_without_a_shell(script: dict[str, Any], tmp_path: Path) -> None:
+    text = "```sh\n# two\nfivebar check no.toml\nfivebar check none.toml\n```"
+    page = script["Page"](text, tmp_path, long=False)
+    page.shell = None
+    said = page.block(page.items[0].text).text
+    assert "no.toml" in said
+    assert "none.toml" not in said  # as in `bash -e`, nothing follows what fails
 
 
 @pytest.mark.parametrize(
