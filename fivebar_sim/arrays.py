@@ -98,6 +98,10 @@ def broadcast(**arrays: Array) -> list[Array]:
     Raises:
         ArgumentError: The shapes do not broadcast; the message names the arrays.
     """
+    # A controller asks at every step, with arrays that are alike already.
+    if len({array.shape for array in arrays.values()}) == 1:
+        return list(arrays.values())
+
     try:
         return list(np.broadcast_arrays(*arrays.values()))
     except ValueError:
