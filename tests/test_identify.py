@@ -153,15 +153,21 @@ def test_torque_per_current_is_found_where_currents_are_logged() -> None:
 
 @pytest.mark.long
 def test_the_truth_is_in_95_of_100_intervals() -> None:
-    """8 numbers of 100 legs, links off by up to 3 %, delays of 0 to 8 ms: each in 90 to 99."""
+    """8 numbers of legs, links off by up to 3 %, delays of 0 to 8 ms: each in 90 to 99 of 100.
+
+    Of 200 logs: of 100 even perfect intervals have one number of eight outside 90 to 99 in one of
+    eight tries, of 200 in one of eighty.
+    """
+    logs = 200
     inside = np.zeros(len(DEFAULT))
-    for seed in range(100):
+    for seed in range(logs):
         log = made(seed, seconds=4.0)
         found = fitted(log)
         inside += off(log, found) < 1.0
         delay = DEFAULT.index("servo.delay")
         assert abs(found.values[delay] - log.truth[delay]) < 0.3e-3
-    assert ((inside >= 90) & (inside <= 99)).all(), dict(zip(DEFAULT, inside, strict=True))
+    share = inside / logs
+    assert ((share >= 0.90) & (share <= 0.99)).all(), dict(zip(DEFAULT, inside, strict=True))
 
 
 def plain(J: Array, values: Array | None = None) -> Fit:
