@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import gc
+import importlib
 import os
+import sys
 from pathlib import Path
+from types import ModuleType
 
 import numpy as np
 import pytest
@@ -50,6 +53,17 @@ def shared_folder(tmp_path_factory: pytest.TempPathFactory) -> None:
 @pytest.fixture
 def rng() -> np.random.Generator:
     return np.random.default_rng(20240607)
+
+
+@pytest.fixture(scope="session")
+def right() -> ModuleType:
+    """Return the controller of leg_programs that knows nothing of the package."""
+    programs = str(Path(__file__).with_name("leg_programs"))
+    sys.path.insert(0, programs)
+    try:
+        return importlib.import_module("right")
+    finally:
+        sys.path.remove(programs)
 
 
 @pytest.fixture

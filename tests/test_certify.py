@@ -33,16 +33,6 @@ def shell(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.Captur
     return Shell(tmp_path, capsys)
 
 
-@pytest.fixture(scope="module")
-def right() -> ModuleType:
-    """Return the controller that knows nothing of the package."""
-    sys.path.insert(0, str(PROGRAMS))
-    try:
-        return importlib.import_module("right")
-    finally:
-        sys.path.remove(str(PROGRAMS))
-
-
 def found(name: str, *args: str) -> judge.Report:
     """Return what comes of one of the test programs."""
     command = [sys.executable, str(PROGRAMS / f"{name}.py"), *args]

@@ -2,32 +2,17 @@
 
 from __future__ import annotations
 
-import importlib
 import itertools
 import math
-import sys
-from pathlib import Path
 from types import ModuleType
 from typing import Any
 
 import numpy as np
-import pytest
 
 from fivebar_sim.certify import judge, suite
 from fivebar_sim.certify.suite import Case, Leg
 
-PROGRAMS = Path(__file__).resolve().parent / "leg_programs"
 LEGS = suite.load()
-
-
-@pytest.fixture(scope="module")
-def right() -> ModuleType:
-    """Return the controller that knows nothing of the package."""
-    sys.path.insert(0, str(PROGRAMS))
-    try:
-        return importlib.import_module("right")
-    finally:
-        sys.path.remove(str(PROGRAMS))
 
 
 def edge(right: ModuleType, leg: Any) -> np.ndarray:
