@@ -20,7 +20,7 @@ from fivebar_sim import rollout
 from fivebar_sim.geometry import FiveBar
 from fivebar_sim.integrator import ON_BELT, ON_RAIL, Integrator
 from fivebar_sim.metrics.guards import Guards
-from fivebar_sim.model.leg import leg_spec, quiet
+from fivebar_sim.model import leg_spec, quiet
 from fivebar_sim.scenario import Scenario
 
 FLOOR = Floor(0.5, 0.006, 0.8, stiffness=1e4, damping=20.0)

@@ -12,6 +12,7 @@ from fivebar_sim.errors import ArgumentError
 from fivebar_sim.files import resources
 from fivebar_sim.geometry import FiveBar
 from fivebar_sim.metrics.columns import JOINTS
+from fivebar_sim.scenario.scenes import Rail
 
 LEGS = {name: FiveBar.load(name) for name in resources.shipped("models/legs")}
 ODD = LEGS["extended"]
@@ -246,3 +247,19 @@ def test_hip_is_out_of_the_floors_reach(leg: FiveBar) -> None:
 def test_refusal(keywords: dict, message: str) -> None:
     with pytest.raises(ArgumentError, match=message):
         model.build(ODD, **keywords)
+
+
+def test_models_do_not_change_each_other() -> None:
+    """The file is read once: each model is made of a copy."""
+    before = model.build(LEGS["classic"])
+    changed = model.leg_spec(LEGS["classic"], scene=Rail())
+    changed.body("L1").pos[0] += 0.01
+    changed.option.timestep = 0.5
+    after = model.build(LEGS["classic"])
+    for other in LEGS.values():
+        model.build(other, scene="rail", timestep=2e-3)
+    again = model.build(LEGS["classic"])
+    for mj in (after, again):
+        assert mj.opt.timestep == before.opt.timestep
+        assert np.array_equal(mj.body_pos, before.body_pos)
+        assert np.array_equal(mj.body_mass, before.body_mass)

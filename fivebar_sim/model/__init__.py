@@ -1,8 +1,9 @@
 """Legs and robots as MuJoCo models."""
 
 from fivebar_sim.integrator import Integrator
+from fivebar_sim.model.file import quiet, without_log
 from fivebar_sim.model.friction import friction_law
-from fivebar_sim.model.leg import HIP_HEIGHT, build, leg_spec, quiet, standing, without_log
+from fivebar_sim.model.leg import HIP_HEIGHT, build, leg_spec, standing
 from fivebar_sim.model.robot import build_robot, robot_spec
 
 __all__ = [

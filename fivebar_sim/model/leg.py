@@ -6,10 +6,6 @@ rebuilds it.
 
 from __future__ import annotations
 
-import warnings
-from collections.abc import Iterator
-from contextlib import contextmanager
-from functools import cache
 from typing import get_args
 
 import mujoco
@@ -25,6 +21,7 @@ from fivebar_sim.integrator import CONNECT, Integrator, solref
 from fivebar_sim.kinematics.stops import stops_at_B, stops_at_C
 from fivebar_sim.links import Link, combined
 from fivebar_sim.metrics.columns import JOINTS, MOTORS
+from fivebar_sim.model.file import quiet, read
 from fivebar_sim.model.friction import rub
 from fivebar_sim.scenario.scenes import Ground, Payload, Scene, Treadmill, named
 
@@ -72,32 +69,6 @@ def build(
         raise GeometryError(f"MuJoCo refuses leg {leg.name!r}: {message}") from None
 
 
-@contextmanager
-def without_log() -> Iterator[None]:
-    """Keep MuJoCo from printing warnings, and from logging them in the working directory.
-
-    Those of a simulation are counted in its data.
-    """
-    before = mujoco.get_mju_user_warning()
-    mujoco.set_mju_user_warning(lambda message: None)
-    try:
-        yield
-    finally:
-        mujoco.set_mju_user_warning(before)
-
-
-@contextmanager
-def quiet() -> Iterator[None]:
-    """Keep MuJoCo's warnings about models from being logged, and from Python.
-
-    Compiling a scene says that a leg whose names have no prefix cannot be saved as part of another
-    file.
-    """
-    with without_log(), warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        yield
-
-
 def leg_spec(
     leg: FiveBar,
     *,
@@ -118,7 +89,7 @@ def leg_spec(
         raise ArgumentError(unknown("drive", str(drive), get_args(Drive)))
 
     file = "leg.xml" if scene is None else f"scenes/{scene.kind}.xml"
-    spec = shipped_spec(file)
+    spec = read(resources.folder("models") / file)
     set_options(spec, leg, timestep, integrator)
 
     # The model is compiled in this pose: a closed one, far from every singularity.
@@ -136,19 +107,6 @@ def leg_spec(
     elif isinstance(scene, Ground):
         _stand(spec, leg, scene, q)
     return spec
-
-
-def shipped_spec(file: str) -> mujoco.MjSpec:
-    """Return what a file of the folder models says, free to be changed."""
-    # Parsing takes as long as compiling, a copy next to nothing.
-    with quiet():
-        return _parsed(file).copy()
-
-
-@cache
-def _parsed(file: str) -> mujoco.MjSpec:
-    """Return what a file of the folder models says, parsed once; nobody may change it."""
-    return mujoco.MjSpec.from_file(str(resources.folder("models") / file))
 
 
 def set_options(

@@ -14,9 +14,11 @@ from fivebar_sim import kinematics
 from fivebar_sim.arrays import Array
 from fivebar_sim.control.servo import Drive
 from fivebar_sim.errors import ArgumentError, GeometryError
+from fivebar_sim.files import resources
 from fivebar_sim.integrator import Integrator
+from fivebar_sim.model.file import quiet, read
 from fivebar_sim.model.ground import lay
-from fivebar_sim.model.leg import HIP_HEIGHT, leg_spec, quiet, set_options, shipped_spec, standing
+from fivebar_sim.model.leg import HIP_HEIGHT, leg_spec, set_options, standing
 from fivebar_sim.robots import LEGS, Air, Floor, Robot, Scene
 from fivebar_sim.robots.floor import Payload
 from fivebar_sim.robots.ground import Ground
@@ -96,7 +98,7 @@ def robot_spec(
 
     q = kinematics.hanging(robot.leg)
     with quiet():
-        spec = shipped_spec(f"robots/{scene.kind}.xml")
+        spec = read(resources.folder("models") / "robots" / f"{scene.kind}.xml")
         set_options(spec, robot.leg, timestep, integrator)
         if isinstance(scene, Floor):
             spec.option.gravity = _downhill(spec.option.gravity, scene.slope)
