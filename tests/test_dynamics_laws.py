@@ -13,6 +13,7 @@ from poses import sample
 
 from fivebar_sim import dynamics, kinematics, model, motion
 from fivebar_sim.arrays import Array
+from fivebar_sim.dynamics.chain import Chain, placed
 from fivebar_sim.errors import ArgumentError, DivergedError
 from fivebar_sim.geometry import HEAVIEST, FiveBar
 from fivebar_sim.integrator import pull
@@ -377,3 +378,20 @@ def test_whole_seconds_and_the_ends_of_tolerances() -> None:
     for given, said in asks:
         with pytest.raises(ArgumentError, match=said):
             dynamics.integrate(floating, theta, (0, 0), (0, 1), **given)
+
+
+@pytest.mark.parametrize("leg", [HEAVY, CLASSIC])
+def test_torques_without_accelerations_are_those_of_none(leg: FiveBar) -> None:
+    """Bit by bit; of straight links too, which are placed in a shorter way."""
+    theta, w, _, _ = state(leg)
+    chain = Chain.of(leg, None, 0.01)
+    pose = chain.pose(theta[:, 0], theta[:, 1])
+    rates = (w[:, 0], w[:, 1], w[:, 0] + 1.0, w[:, 1] - 2.0)
+    still = chain.link_torques(pose, rates, (0.0, 0.0, 0.0, 0.0))
+    for whole, short in zip(
+        still, chain.turning_torques(pose, rates, chain.moments(pose)), strict=True
+    ):
+        assert np.array_equal(whole, short)
+    for across in (0.0, 0.003):
+        x, z = placed(pose.e2, (0.05, np.array(across)))
+        np.testing.assert_array_equal(placed(pose.e2, (0.05, across)), (x, z))

@@ -56,7 +56,11 @@ def dot(a: Vector, b: Vector) -> Scalar:
 
 def placed(e: Vector, r: Vector) -> Vector:
     """Return a vector r = (along, across) of a link in the hip frame; e is the link's direction."""
-    return r[0] * e[0] - r[1] * e[1], r[0] * e[1] + r[1] * e[0]
+    along, across = r
+    # Straight links, as most are, are placed in a third of the time.
+    if isinstance(across, float) and across == 0.0:
+        return along * e[0], along * e[1]
+    return along * e[0] - across * e[1], along * e[1] + across * e[0]
 
 
 def split(pairs: Array) -> Vector:
@@ -256,8 +260,11 @@ class Chain:
 
     def couplings(self, p: Pose) -> Vector:
         """Return H12 = L1 e1 . r2 and H43 = L4 e4 . r3 [kg m^2], r_k from `moments`."""
-        H12 = self.leg.L1 * dot(p.e1, placed(p.e2, self.S2))
-        return H12, self.leg.L4 * dot(p.e4, placed(p.e3, self.S3))
+        return self._coupled_by(p, placed(p.e2, self.S2), placed(p.e3, self.S3))
+
+    def _coupled_by(self, p: Pose, r2: Vector, r3: Vector) -> Vector:
+        """Return the `couplings` of moments that are known already."""
+        return self.leg.L1 * dot(p.e1, r2), self.leg.L4 * dot(p.e4, r3)
 
     def mass(self, p: Pose) -> tuple[Scalar, Scalar, Scalar]:
         """Return M_AA, M_AE, M_EE [kg m^2] of M = G^T H G."""
@@ -279,8 +286,8 @@ class Chain:
         """
         w1, w2, w3, w4 = w
         gravity = self.leg.gravity
-        H12, H43 = self.couplings(p)
         r1, r2, r3, r4 = self.moments(p)
+        H12, H43 = self._coupled_by(p, r2, r3)
         X12 = self.leg.L1 * cross(p.e1, r2)
         X43 = self.leg.L4 * cross(p.e4, r3)
 
@@ -290,6 +297,21 @@ class Chain:
             H43 * alpha[3] + self.I3 * alpha[2] + X43 * w4 * w4 - cross(r3, gravity),
             self.I4 * alpha[3] + H43 * alpha[2] - X43 * w3 * w3 - cross(r4, gravity),
         )
+
+    def turning_torques(self, p: Pose, w: Four, r: tuple[Vector, Vector, Vector, Vector]) -> Four:
+        """Return c - Q of links 1..4 [N m]: `link_torques` without accelerations, bit by bit.
+
+        Args:
+            p: The pose.
+            w: Rates of the links [rad/s].
+            r: Its `moments`, which other rates at the same pose share.
+        """
+        w1, w2, w3, w4 = w
+        gravity = self.leg.gravity
+        X12 = self.leg.L1 * cross(p.e1, r[1])
+        X43 = self.leg.L4 * cross(p.e4, r[2])
+        c = (-X12 * w2 * w2, X12 * w1 * w1, X43 * w4 * w4, -X43 * w3 * w3)
+        return tuple(each - cross(moment, gravity) for each, moment in zip(c, r, strict=True))
 
     def at_motors(self, p: Pose, t: Four) -> Vector:
         """Return the motor torques G^T t [N m] of link torques t."""
@@ -347,15 +369,20 @@ class Chain:
         det = M_AA * M_EE - M_AE * M_AE
         return (M_EE * t_A - M_AE * t_E) / det, (M_AA * t_E - M_AE * t_A) / det
 
-    def energies(self, p: Pose, w: Four) -> Vector:
+    def energies(self, p: Pose, w: Four, r: tuple[Vector, Vector, Vector, Vector]) -> Vector:
         """Return the kinetic and the potential energy, zero at O [J]; the loop may be open.
 
         psi_dot^T H psi_dot / 2,   -gravity . (moments of mass about O)
+
+        Args:
+            p: The pose.
+            w: Rates of the links [rad/s].
+            r: Its `moments`.
         """
         w1, w2, w3, w4 = w
-        H12, H43 = self.couplings(p)
+        H12, H43 = self._coupled_by(p, r[1], r[2])
         turning = self.I1 * w1 * w1 + self.I2 * w2 * w2 + self.I3 * w3 * w3 + self.I4 * w4 * w4
-        lift = sum(dot(r, self.leg.gravity) for r in (self.hung, *self.moments(p)))
+        lift = sum(dot(moment, self.leg.gravity) for moment in (self.hung, *r))
         return 0.5 * turning + H12 * w1 * w2 + H43 * w4 * w3, -lift
 
 

@@ -127,7 +127,7 @@ class LegDynamics:
         p = self._chain.pose(*split(theta))
         w1, w4 = split(w)
         rates = w1, p.a2 * w1 + p.b2 * w4, p.a3 * w1 + p.b3 * w4, w4
-        kinetic, potential = self._chain.energies(p, rates)
+        kinetic, potential = self._chain.energies(p, rates, self._chain.moments(p))
         return Energy(np.asarray(kinetic), np.asarray(potential))
 
     def reflected_inertia(self, theta: ArrayLike) -> Array:

@@ -278,13 +278,11 @@ def _given_away(chain: Chain, m: _Motion, p: Pose) -> Array:
     """
     v = tuple(rate[:-1] for rate in _of_links(m.v))
     w = _of_links(m.w)
-    still = (0.0, 0.0, 0.0, 0.0)
-    at_start = chain.link_torques(p, v, still)
-    meant = chain.link_torques(p, w, still)
+    moments = chain.moments(p)
+    at_start = chain.turning_torques(p, v, moments)
+    meant = chain.turning_torques(p, w, moments)
     links = sum((c - d) * rate for c, d, rate in zip(at_start, meant, w, strict=True))
-    hip = sum(
-        r[1] * (a * a - b * b) for r, a, b in zip(chain.moments(p), v, w, strict=True)
-    )  # fmt: skip
+    hip = sum(r[1] * (a * a - b * b) for r, a, b in zip(moments, v, w, strict=True))
 
     return np.asarray(hip * m.lift - links)
 
@@ -313,8 +311,9 @@ def _energies(
     """Return what `mechanical` does, of each joint's angles and rates (...)."""
     p = _open_pose(q)
     w = _of_links(v)
-    kinetic, potential = chain.energies(p, w)
-    momentum = sum(r[0] * rate for r, rate in zip(chain.moments(p), w, strict=True))
+    moments = chain.moments(p)
+    kinetic, potential = chain.energies(p, w, moments)
+    momentum = sum(r[0] * rate for r, rate in zip(moments, w, strict=True))
     gravity = body.leg.gravity[1]
     return (
         kinetic + hip_dot * (momentum + 0.5 * body.mass * hip_dot),
