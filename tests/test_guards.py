@@ -369,7 +369,9 @@ def test_everyone_is_told(shell: Shell, monkeypatch: pytest.MonkeyPatch) -> None
 def test_the_part_that_was_first_is_named_with_the_worst_of_all(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    def depths(leg: FiveBar, record: dict[str, Array], trunk: float) -> dict[str, Array]:
+    def depths(
+        leg: FiveBar, record: dict[str, Array], trunk: float, known: object
+    ) -> dict[str, Array]:
         time = record["time"]
         # From step 30, 10 and 20 on: neither the first nor the last name, nor the deepest.
         return {

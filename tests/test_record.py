@@ -15,7 +15,7 @@ from shell import Shell
 from fivebar_sim import kinematics, metrics, rollout
 from fivebar_sim.arrays import Array
 from fivebar_sim.errors import ConfigError
-from fivebar_sim.metrics import load
+from fivebar_sim.metrics import branch, ground, load
 from fivebar_sim.metrics.catalogue import ROBOTS, SHOWN, shown
 from fivebar_sim.rollout import Plan, Result
 from fivebar_sim.scenario import Scenario
@@ -301,3 +301,17 @@ def test_ground_is_shown_where_there_is_one(shell: Shell) -> None:
 def test_refusal_is_one_line(shell: Shell, settings: list[str], message: str) -> None:
     changes = [word for setting in settings for word in ("--set", setting)]
     assert shell.refused("run", "short.toml", *changes).startswith(f"short.toml: {message}")
+
+
+@pytest.mark.parametrize("kind", SCENES)
+def test_what_the_recorder_keeps_is_what_the_record_tells(kind: str) -> None:
+    """Branch and joints' heights are taken of the simulated states, block by block."""
+    plan, result = done(kind)
+    (recorder,) = rollout._recorded([plan], 1)
+    leg = plan.scenario.leg
+    kept = recorder.unrecorded
+    assert kept.signs is not None
+    assert np.array_equal(kept.signs, branch.signs_of(leg, result.record))
+    assert (kept.heights == {}) == ("ground_z" not in result.record)
+    for name, height in (kept.heights or {}).items():
+        assert np.array_equal(height, ground.heights_of(leg, result.record)[name])

@@ -7,6 +7,7 @@ from typing import Annotated
 
 import msgspec
 import numpy as np
+from numpy.typing import NDArray
 
 from fivebar_sim import kinematics
 from fivebar_sim.arrays import Array, blocks
@@ -31,20 +32,37 @@ class Branch(Table, frozen=True):
     first_flip: Amount
 
 
-def measure(leg: FiveBar, record: Mapping[str, Array]) -> Branch:
+def signs(leg: FiveBar, points: kinematics.Points) -> NDArray[np.int8]:
+    """Return s_A, s_E and the assembly of poses, given their joints, (3, N)."""
+    return np.array(kinematics.branch(leg, points), dtype=np.int8)
+
+
+def signs_of(leg: FiveBar, record: Mapping[str, Array]) -> NDArray[np.int8]:
+    """Return the `signs` of a record's poses, (3, N)."""
+    found = np.empty((3, len(record["time"])), dtype=np.int8)
+    for rows in blocks(found.shape[1]):
+        q = side_by_side({name: record[name][rows] for name in JOINT_COLUMNS}, JOINT_COLUMNS)
+        found[:, rows] = signs(leg, kinematics.chain_points(leg, q))
+    return found
+
+
+def measure(
+    leg: FiveBar, record: Mapping[str, Array], known: NDArray[np.int8] | None = None
+) -> Branch:
     """Return the branch of the last step, how often it flipped, and when first.
 
     Every step is compared with the one before, the first with the leg's own branch.
-    """
-    signs = np.empty((3, len(record["time"])), dtype=np.int8)
-    for rows in blocks(signs.shape[1]):
-        q = side_by_side({name: record[name][rows] for name in JOINT_COLUMNS}, JOINT_COLUMNS)
-        signs[:, rows] = kinematics.branch(leg, kinematics.chain_points(leg, q))
 
+    Args:
+        leg: The leg.
+        record: The columns of rollout.parquet.
+        known: Its `signs_of`, if somebody has them already.
+    """
+    every = signs_of(leg, record) if known is None else known
     # Beginning with the leg's own branch, a start in another one counts as a flip.
     own = np.array([[*leg.mode, leg.assembly]], dtype=np.int8).T
-    flipped = np.any(np.diff(signs, axis=1, prepend=own) != 0, axis=0)
-    s_A, s_E, assembly = signs[:, -1].tolist()
+    flipped = np.any(np.diff(every, axis=1, prepend=own) != 0, axis=0)
+    s_A, s_E, assembly = every[:, -1].tolist()
     return Branch(
         working_mode=[s_A, s_E],
         assembly=assembly,

@@ -40,35 +40,48 @@ def height(leg: FiveBar, record: Mapping[str, Array]) -> Array:
     return record["hip_z"] + record["foot_z"] - leg.foot_radius
 
 
-def depths(leg: FiveBar, record: Mapping[str, Array], trunk: float) -> dict[str, Array]:
+def joint_heights(leg: FiveBar, points: kinematics.Points) -> dict[str, Array]:
+    """Return the heights of the joints that move and do not collide [m], hip frame, each (N,).
+
+    The foot is left out, and C with it where the foot's ball contains C's.
+    """
+    heights = {"B": points.B[:, 1], "D": points.D[:, 1]}
+    if leg.L6 > max(leg.foot_radius - leg.radius, 0.0):
+        heights["C"] = np.minimum(points.C_left[:, 1], points.C_right[:, 1])
+    return heights
+
+
+def heights_of(leg: FiveBar, record: Mapping[str, Array]) -> dict[str, Array]:
+    """Return the `joint_heights` of a record's poses."""
+    found: dict[str, Array] = {}
+    rows = len(record["time"])
+    for part in blocks(rows):
+        q = side_by_side({name: record[name][part] for name in JOINT_COLUMNS}, JOINT_COLUMNS)
+        for name, height in joint_heights(leg, kinematics.chain_points(leg, q)).items():
+            found.setdefault(name, np.empty(rows))[part] = height
+    return found
+
+
+def depths(
+    leg: FiveBar,
+    record: Mapping[str, Array],
+    trunk: float,
+    known: Mapping[str, Array] | None = None,
+) -> dict[str, Array]:
     """Return how deep what does not collide is in the floor [m], by part, each (N,); 0 above it.
 
     The lowest point of a link is on the ball that its capsule ends with, so the joints stand for
-    the links. The foot is left out, and C with it where the foot's ball contains C's.
+    the links.
 
     Args:
         leg: The leg.
         record: The columns of rollout.parquet.
         trunk: Height of the trunk's lowest point above the hip frame's origin [m].
+        known: Its `heights_of`, if somebody has them already.
     """
-    found: dict[str, Array] = {}
-    rows = len(record["time"])
-    for part in blocks(rows):
-        some = {name: record[name][part] for name in (*JOINT_COLUMNS, "hip_z")}
-        for name, depth in _depths(leg, some, trunk).items():
-            found.setdefault(name, np.empty(rows))[part] = depth
-    return found
-
-
-def _depths(leg: FiveBar, record: Mapping[str, Array], trunk: float) -> dict[str, Array]:
-    """Return what `depths` does, all rows at once."""
-    q = side_by_side(record, JOINT_COLUMNS)
-    points = kinematics.chain_points(leg, q)
     A, E = kinematics.bases(leg)
-    heights = {"A": A[1], "B": points.B[:, 1], "D": points.D[:, 1], "E": E[1]}
-    if leg.L6 > max(leg.foot_radius - leg.radius, 0.0):
-        heights["C"] = np.minimum(points.C_left[:, 1], points.C_right[:, 1])
-
+    moving = heights_of(leg, record) if known is None else known
+    heights = {"A": A[1], "B": moving["B"], "D": moving["D"], "E": E[1], **moving}
     lowest = {f"joint {joint}": z - leg.radius for joint, z in heights.items()} | {"trunk": trunk}
     return {part: np.maximum(-(record["hip_z"] + z), 0.0) for part, z in lowest.items()}
 

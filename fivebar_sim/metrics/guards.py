@@ -151,6 +151,7 @@ class Evidence(NamedTuple):
             without feedback.
         jolts: Torque that lasts a single step, as a part of the run's largest, (N,); None in torque
             drive.
+        heights: Heights of the joints, see `ground.heights_of`; None: the record tells them.
     """
 
     bounds: Guards
@@ -167,6 +168,7 @@ class Evidence(NamedTuple):
     heating: Heating | None = None
     growth: Array | None = None
     jolts: Array | None = None
+    heights: Mapping[str, Array] | None = None
 
 
 class Found(NamedTuple):
@@ -266,8 +268,7 @@ def _overheated(run: Evidence) -> Found | None:
     if run.heating is None or run.heating.used is None:
         return None
     high = run.bounds.heat
-    used = run.heating.used
-    return Found(used, high, run.heating.reaches(high))
+    return Found(run.heating.used, high, run.heating.reaches(high))
 
 
 def _unstable(run: Evidence) -> Found | None:
@@ -290,8 +291,8 @@ def _through_floor(run: Evidence) -> Found | None:
     if "ground_z" not in run.record:
         return None
     # Only the foot collides: anything else would go through the floor without a force.
-    found = ground.depths(run.leg, run.record, run.trunk)
-    return first_of(run, found, run.bounds.floor * run.leg.size)
+    depths = ground.depths(run.leg, run.record, run.trunk, run.heights)
+    return first_of(run, depths, run.bounds.floor * run.leg.size)
 
 
 def _carrying_rail(run: Evidence) -> Found | None:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import msgspec
 import numpy as np
+from numpy.typing import NDArray
 
 from fivebar_sim.arrays import Array, Bools, sum_of_columns
 from fivebar_sim.control import Feedback
@@ -57,6 +58,8 @@ class Unrecorded(NamedTuple):
             (N,); None without feedback. See `sampling.Stability.hidden`.
         jolts: Torque that lasts a single step, as a part of the run's largest, (N,); None in torque
             drive, where a torque lasts as long as the controller's period.
+        signs: The branch of each step, see `branch.signs_of`; None: the record tells it.
+        heights: Heights of the joints, see `ground.heights_of`; None: the record tells them.
     """
 
     steps: energy.Steps
@@ -67,6 +70,8 @@ class Unrecorded(NamedTuple):
     trunk: float
     growth: Array | None = None
     jolts: Array | None = None
+    signs: NDArray[np.int8] | None = None
+    heights: Mapping[str, Array] | None = None
 
 
 def measure(scenario: Scenario, record: Mapping[str, Array], besides: Unrecorded) -> Measured:
@@ -86,7 +91,7 @@ def measure(scenario: Scenario, record: Mapping[str, Array], besides: Unrecorded
 
     body = energy.Body(leg, scenario.payload, scenario.trunk)
     balance = energy.balance(body, record, besides.steps)
-    folded = branch.measure(leg, record)
+    folded = branch.measure(leg, record, besides.signs)
     heated = heating_of(scenario, record)
     checked = guards.Evidence(
         bounds=scenario.guards,
@@ -103,6 +108,7 @@ def measure(scenario: Scenario, record: Mapping[str, Array], besides: Unrecorded
         heating=heated,
         growth=besides.growth,
         jolts=besides.jolts,
+        heights=besides.heights,
     )
 
     window = scenario.window

@@ -50,19 +50,23 @@ class Part(NamedTuple):
     before: Array
 
 
-def columns(planned: Plan, part: Part) -> Record:
+def points(planned: Plan, part: Part) -> kinematics.Points:
+    """Return the joints after each step [m], hip frame, (N, 2) each, the loop open by its gap."""
+    # From qpos itself: MuJoCo's site positions are those before the step.
+    return kinematics.chain_points(planned.scenario.leg, _joints(part.states)[0])
+
+
+def columns(planned: Plan, part: Part, points: kinematics.Points) -> Record:
     """Return rows of the record: row k is the state at t = (k + 1) h, with the torques to it.
 
     Args:
         planned: The plan that was simulated.
         part: Its steps, all or some.
+        points: Their `points`.
     """
-    leg = planned.scenario.leg
     wanted = planned.motion
     begin = part.begin
     q, v, ctrl = _joints(part.states)
-    # Foot and gap from qpos itself: MuJoCo's site positions are those before the step.
-    points = kinematics.chain_points(leg, q)
     # The plan starts at t = 0, the states one step later.
     rows = slice(begin + 1, begin + len(q) + 1)
     target = wanted.foot[rows]

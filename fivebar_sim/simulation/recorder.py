@@ -5,10 +5,11 @@ from __future__ import annotations
 from contextlib import nullcontext
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fivebar_sim.arrays import Array, Bools, blocks
 from fivebar_sim.errors import DivergedError
-from fivebar_sim.metrics import energy
+from fivebar_sim.metrics import branch, energy, ground
 from fivebar_sim.metrics.columns import Record
 from fivebar_sim.metrics.tracking import left_path
 from fivebar_sim.simulation import record
@@ -34,6 +35,8 @@ class Recorder:
         self._done = 0
         self._before = planned.start
         self._columns: Record = {}
+        self._heights: Record = {}
+        self._signs: NDArray[np.int8] = np.empty((3, steps), dtype=np.int8)
         self._constraint: Array = np.empty((steps, planned.model.nv))
         self._saturated: Bools = np.empty((steps, 2), dtype=bool)
         self._unsolved: Bools = np.empty(steps, dtype=bool)
@@ -61,8 +64,12 @@ class Recorder:
         rows = slice(self._done, self._done + states.time.shape[1])
         # The states of a breakdown may overflow; such an angle counts as off the path.
         with np.errstate(all="ignore") if self.error is not None else nullcontext():
-            for name, values in record.columns(planned, part).items():
-                self._column(name)[rows] = values
+            points = record.points(planned, part)
+            self._fill(self._columns, rows, record.columns(planned, part, points))
+            # Of the same points, which take sines and cosines: the branch, and depths in the floor.
+            self._signs[:, rows] = branch.signs(planned.scenario.leg, points)
+            if "ground_z" in self._columns:
+                self._fill(self._heights, rows, ground.joint_heights(planned.scenario.leg, points))
             self._saturated[rows] = record.saturated(planned, part)
             self._constraint[rows] = record.forces(planned, part)
 
@@ -70,11 +77,12 @@ class Recorder:
         self._before = states.qpos[0, -1].copy()
         self._done = rows.stop
 
-    def _column(self, name: str) -> Array:
-        """Return a column to be filled; each lies in one piece of memory of its own."""
-        if name not in self._columns:
-            self._columns[name] = np.empty(self._planned.scenario.steps)
-        return self._columns[name]
+    def _fill(self, columns: Record, rows: slice, parts: Record) -> None:
+        """Fill rows of columns, each of which lies in one piece of memory of its own."""
+        for name, values in parts.items():
+            if name not in columns:
+                columns[name] = np.empty(self._planned.scenario.steps)
+            columns[name][rows] = values
 
     @property
     def record(self) -> Record:
@@ -94,6 +102,8 @@ class Recorder:
             trunk=record.lowest(planned.model),
             growth=record.growth(planned, self.record),
             jolts=record.jolts(planned, self.record),
+            signs=self._signs,
+            heights=self._heights,
         )
 
     def broken(self, error: DivergedError) -> DivergedError:

@@ -129,7 +129,8 @@ def of_states(planned: RobotPlan, states: States) -> Walk:
 
 def _leg(planned: RobotPlan, states: States, k: int) -> Record:
     """Return the columns of leg k, without its name and the time."""
-    record = recorded.columns(planned.legs[k], _part(planned, states, k))
+    part = _part(planned, states, k)
+    record = recorded.columns(planned.legs[k], part, recorded.points(planned.legs[k], part))
     del record["time"]
     # Held out of reach of the floor, a foot has a sensor of its force too.
     if isinstance(planned.scene, Floor):
