@@ -50,10 +50,11 @@ class Bus:
         self._period = latched // every
         self._older = older // every
         self._part = np.array([servo.late(steps, timestep)[1] for servo in kinds.values()])
+        self._is_split = bool(self._part.any())
 
         # If every command acts at once and until the next one, none needs to be stored.
         at_once = bool((self._period == np.arange(steps) // every).all())
-        self._prompt = at_once and not self._part.any()
+        self._prompt = at_once and not self._is_split
         periods = 0 if self._prompt else -(-steps // every)
         self._commands = np.zeros((len(servos), periods, 2))
 
@@ -80,9 +81,11 @@ class Bus:
             held = command[:, None].copy() if n == 1 else np.repeat(command[:, None], n, axis=1)
             return self._round(held)
 
-        at = np.broadcast_to(k, len(command))
-        self._commands[self._legs, at // self._every] = command
-        return self._look_up(at[:, None] + np.arange(n))
+        if isinstance(k, int):
+            self._commands[:, k // self._every] = command
+            return self._look_up(np.arange(k, k + n)[None])
+        self._commands[self._legs, k // self._every] = command
+        return self._look_up(k[:, None] + np.arange(n))
 
     def send_all(self, commands: Array) -> Array:
         """Return the commands that act in each step of the run, (nsim, N, 2).
@@ -97,9 +100,9 @@ class Bus:
         """Return the commands that act in some steps, (nsim, n, 2)."""
         kind = self._kind[:, None]
         acting = self._of(self._period[kind, k])
-        part = self._part[self._kind][:, None, None]
-        if not part.any():
+        if not self._is_split:
             return acting
+        part = self._part[self._kind][:, None, None]
         older = self._of(self._older[kind, k])
         # Legs whose delay is whole keep their bits beside others.
         return np.where(part > 0.0, acting + part * (older - acting), acting)
