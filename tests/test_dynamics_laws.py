@@ -13,7 +13,8 @@ from poses import sample
 
 from fivebar_sim import dynamics, kinematics, model, motion
 from fivebar_sim.arrays import Array
-from fivebar_sim.dynamics.chain import Chain, placed
+from fivebar_sim.dynamics.chain import Chain
+from fivebar_sim.dynamics.plane import placed
 from fivebar_sim.errors import ArgumentError, DivergedError
 from fivebar_sim.geometry import HEAVIEST, FiveBar
 from fivebar_sim.integrator import pull

@@ -17,7 +17,8 @@ import numpy as np
 
 from fivebar_sim import kinematics
 from fivebar_sim.arrays import Array, blocks
-from fivebar_sim.dynamics.chain import Chain, placed
+from fivebar_sim.dynamics.chain import Chain
+from fivebar_sim.dynamics.plane import placed
 from fivebar_sim.errors import FiveBarError
 from fivebar_sim.geometry import FiveBar
 from fivebar_sim.kinematics.planar import cross, dot, perp

@@ -29,47 +29,11 @@ import numpy as np
 from fivebar_sim import kinematics
 from fivebar_sim.arrays import Array
 from fivebar_sim.checks import check_number
+from fivebar_sim.dynamics.plane import Four, Scalar, Vector, cross, dot, placed
 from fivebar_sim.errors import ArgumentError
 from fivebar_sim.geometry import HEAVIEST, FiveBar
 from fivebar_sim.kinematics.rates import SINGULAR
 from fivebar_sim.links import Link, combined
-
-Scalar = Any
-"""A float, or an array of shape (...)."""
-
-Vector = tuple[Scalar, Scalar]
-"""(x, z), or (along, across) in a link's own frame."""
-
-Four = tuple[Scalar, Scalar, Scalar, Scalar]
-"""One value for each of the links L1..L4."""
-
-
-def cross(a: Vector, b: Vector) -> Scalar:
-    """Return a_x b_z - a_z b_x."""
-    return a[0] * b[1] - a[1] * b[0]
-
-
-def dot(a: Vector, b: Vector) -> Scalar:
-    """Return a_x b_x + a_z b_z."""
-    return a[0] * b[0] + a[1] * b[1]
-
-
-def placed(e: Vector, r: Vector) -> Vector:
-    """Return a vector r = (along, across) of a link in the hip frame; e is the link's direction."""
-    along, across = r
-    # Straight links, as most are, are placed in a third of the time.
-    if isinstance(across, float) and across == 0.0:
-        return along * e[0], along * e[1]
-    return along * e[0] - across * e[1], along * e[1] + across * e[0]
-
-
-def split(pairs: Array) -> Vector:
-    """Return the two coordinates of pairs (..., 2), each (...); of a single pair plain numbers."""
-    # Arithmetic on NumPy's own numbers takes three times as long.
-    if pairs.ndim == 1:
-        x, z = pairs.tolist()
-        return x, z
-    return pairs[..., 0], pairs[..., 1]
 
 
 class Pose(NamedTuple):

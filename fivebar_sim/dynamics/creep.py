@@ -26,7 +26,8 @@ import numpy as np
 
 from fivebar_sim import kinematics
 from fivebar_sim.arrays import Array, Bools
-from fivebar_sim.dynamics.chain import Chain, dot, placed
+from fivebar_sim.dynamics.chain import Chain
+from fivebar_sim.dynamics.plane import dot, placed
 from fivebar_sim.geometry import FiveBar
 from fivebar_sim.integrator import FRICTION_RATE
 

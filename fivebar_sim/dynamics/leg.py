@@ -13,8 +13,9 @@ from fivebar_sim import kinematics
 from fivebar_sim.arrays import Array, as_pairs, broadcast, finite
 from fivebar_sim.checks import check_number
 from fivebar_sim.dynamics import motion, stepwise
-from fivebar_sim.dynamics.chain import Chain, Pose, Vector, cross, placed, split
+from fivebar_sim.dynamics.chain import Chain, Pose
 from fivebar_sim.dynamics.motion import Law, Motion
+from fivebar_sim.dynamics.plane import Vector, cross, placed, split
 from fivebar_sim.geometry import FiveBar
 from fivebar_sim.kinematics.rates import check_sine
 

@@ -16,7 +16,8 @@ from numpy.typing import ArrayLike
 
 from fivebar_sim.arrays import Array, as_pairs, at, broadcast, finite, first_index
 from fivebar_sim.checks import check_number
-from fivebar_sim.dynamics.chain import Chain, Pose, Vector, split
+from fivebar_sim.dynamics.chain import Chain, Pose
+from fivebar_sim.dynamics.plane import Vector, split
 from fivebar_sim.errors import (
     ArgumentError,
     DivergedError,

@@ -16,8 +16,9 @@ from numpy.typing import ArrayLike
 
 from fivebar_sim.arrays import Array, as_pairs, as_vectors, at, finite, first_index
 from fivebar_sim.checks import check_number
-from fivebar_sim.dynamics.chain import Chain, Four, Pose, Vector, cross, dot
+from fivebar_sim.dynamics.chain import Chain, Pose
 from fivebar_sim.dynamics.motion import TURN_MAX
+from fivebar_sim.dynamics.plane import Four, Vector, cross, dot
 from fivebar_sim.errors import ArgumentError, DivergedError, SingularError
 from fivebar_sim.geometry import FiveBar
 from fivebar_sim.integrator import pull

@@ -22,7 +22,8 @@ import numpy as np
 
 from fivebar_sim import kinematics
 from fivebar_sim.arrays import Array, blocks
-from fivebar_sim.dynamics.chain import Chain, Four, Pose, Vector, placed
+from fivebar_sim.dynamics.chain import Chain, Pose
+from fivebar_sim.dynamics.plane import Four, Vector, placed
 from fivebar_sim.geometry import FiveBar
 from fivebar_sim.metrics.columns import (
     JOINT_COLUMNS,

@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fivebar_sim.arrays import Array, Bools
-from fivebar_sim.dynamics.chain import Chain, Vector
+from fivebar_sim.dynamics.chain import Chain
+from fivebar_sim.dynamics.plane import Vector
 from fivebar_sim.geometry import CLOSING, FiveBar
 from fivebar_sim.links import Link, ball, capsule, combined, moved, rod
 

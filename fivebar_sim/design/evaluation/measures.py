@@ -11,7 +11,7 @@ from fivebar_sim.design.evaluation.legs import Legs
 from fivebar_sim.design.evaluation.motors import Motors
 from fivebar_sim.design.evaluation.objectives import CATALOGUE, Driven
 from fivebar_sim.design.evaluation.poses import Poses
-from fivebar_sim.dynamics.chain import Vector, cross
+from fivebar_sim.dynamics.plane import Vector, cross
 
 if TYPE_CHECKING:
     from fivebar_sim.design.task.task import Task

@@ -13,7 +13,8 @@ from fivebar_sim.design.evaluation import reach_area
 from fivebar_sim.design.evaluation.legs import Legs
 from fivebar_sim.design.evaluation.motors import Motors
 from fivebar_sim.design.evaluation.poses import Poses, Rates, side, slopes
-from fivebar_sim.dynamics.chain import Pose, Vector
+from fivebar_sim.dynamics.chain import Pose
+from fivebar_sim.dynamics.plane import Vector
 from fivebar_sim.errors import ConfigError, unknown
 
 

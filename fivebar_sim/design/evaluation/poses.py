@@ -18,7 +18,8 @@ import numpy as np
 from fivebar_sim.arrays import Array, Bools
 from fivebar_sim.design.evaluation.legs import Legs
 from fivebar_sim.design.task.motions import Moving
-from fivebar_sim.dynamics.chain import Chain, Pose, Vector, cross
+from fivebar_sim.dynamics.chain import Chain, Pose
+from fivebar_sim.dynamics.plane import Vector, cross
 
 
 class Poses(NamedTuple):
