@@ -9,7 +9,6 @@ from __future__ import annotations
 import os
 import shutil
 import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -345,28 +344,6 @@ def test_what_cannot_be_drawn_is_one_line(recorded: Shell, monkeypatch: pytest.M
     assert shell.refused("render", "no") == "no is not a run directory: no such directory"
     Path("mine/rollout.parquet").write_bytes(b"no")
     assert "mine/rollout.parquet is not a record" in shell.refused("render", "mine")
-
-
-@pytest.mark.skipif(sys.platform != "linux", reason="elsewhere MuJoCo's own GL is used")
-def test_a_gl_is_found_by_trying(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.delenv("MUJOCO_GL", raising=False)
-    monkeypatch.setattr(gl, "works", lambda way: True)
-    assert gl.find() == "egl"
-    monkeypatch.setattr(gl, "works", lambda way: way == "osmesa")
-    assert gl.find() == "osmesa"
-    monkeypatch.setenv("MUJOCO_GL", "EGL")
-    with pytest.raises(ConfigError, match=r"MUJOCO_GL=egl does not work .* libegl1, or unset"):
-        gl.find()
-    monkeypatch.setenv("MUJOCO_GL", "osmesa")
-    assert gl.find() == "osmesa"
-    monkeypatch.setenv("MUJOCO_GL", "glfw")
-    monkeypatch.setattr(gl, "works", lambda way: False)
-    with pytest.raises(ConfigError, match="install the Debian package libegl1 or libosmesa6"):
-        gl.find()
-
-
-def test_what_does_not_work_is_found_out() -> None:
-    assert not gl.works("no_such_way")
 
 
 @pytest.mark.parametrize(
