@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import cache
 
 import numpy as np
 import pytest
@@ -24,9 +25,17 @@ COAXIAL = FiveBar(0.112, 0.199, 0.199, 0.112, 0.0, 0.0325)
 TWO_PARTS = FiveBar(0.1, 0.012, 0.013, 0.1, 0.1)  # narrow rings: cross above and below AE only
 
 
-def assemblies(leg: FiveBar, foot: Array, mode: Mode) -> Array:
-    """Return the assembly mode of each foot position, 0 where out of reach or singular."""
-    theta = kinematics.inverse_all(leg, foot)[..., MODES.index(mode), :]
+def assemblies(leg: FiveBar, foot: Array, mode: Mode, every: Array | None = None) -> Array:
+    """Return the assembly mode of each foot position, 0 where out of reach or singular.
+
+    Args:
+        leg: The leg.
+        foot: Foot positions.
+        mode: A working mode.
+        every: Their angles in all modes, if they are known already.
+    """
+    every = kinematics.inverse_all(leg, foot) if every is None else every
+    theta = every[..., MODES.index(mode), :]
     ok = np.isfinite(theta[..., 0])
     triple = signs(leg, distances_of(leg, points_at(leg, foot[ok], theta[ok])))
     found = np.zeros(foot.shape[:-1], dtype=int)
@@ -60,8 +69,9 @@ def test_a_walk_that_meets_no_singularity_stays_in_its_aspect(
     ends = rng.uniform(-1.0, 1.0, (2, 200, 1, 2)) * leg.size
     walks = ends[0] + (ends[1] - ends[0]) * np.linspace(0.0, 1.0, 60)[:, None]
     stayed = 0
+    every = kinematics.inverse_all(leg, walks)
     for mode in MODES:
-        found = assemblies(leg, walks, mode)
+        found = assemblies(leg, walks, mode, every)
         clear = (found == found[:, :1]).all(axis=1) & (found[:, 0] != 0)
         p = walks[clear, 0]
         q = walks[clear, -1]
@@ -82,13 +92,20 @@ def test_other_assembly_is_another_aspect() -> None:
 # oracle
 
 
+@cache
+def plane(leg: FiveBar) -> tuple[Array, Array]:
+    """Return a fine grid of foot positions, and their angles in all modes."""
+    line = np.linspace(-1.2, 1.2, 301) * leg.size
+    foot = np.stack(np.meshgrid(line, line, indexing="ij"), axis=-1)
+    return foot, kinematics.inverse_all(leg, foot)
+
+
 @pytest.mark.parametrize("leg", [CLASSIC, RIGID, FiveBar(0.335, 0.6025, 0.6025, 0.335, 0.4925)])
 @pytest.mark.parametrize("mode", MODES)
 def test_parts_are_those_of_the_foot_plane(leg: FiveBar, mode: Mode) -> None:
     """Components of a fine grid of feet, a chart that the atlas has not; slivers left out."""
-    line = np.linspace(-1.2, 1.2, 301) * leg.size
-    foot = np.stack(np.meshgrid(line, line, indexing="ij"), axis=-1)
-    found = assemblies(leg, foot, mode)
+    foot, every_mode = plane(leg)
+    found = assemblies(leg, foot, mode, every_mode)
     seen = []
     for assembly in (-1, 1):
         label = np.zeros(found.shape, dtype=int)

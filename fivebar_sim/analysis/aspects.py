@@ -213,11 +213,12 @@ def _draw_atlas(leg: FiveBar, cells: int) -> _Atlas:
 
     corners = _corners(q, _sheets(leg, points), cells)
     # Every node is linked with the corners of its own cells in all three charts.
-    one = np.repeat(np.arange(len(q)), corners.shape[1])
-    other = corners.ravel()
-    joined = triple[one].any(axis=-1) & (triple[one] == triple[other]).all(axis=-1)
+    one = np.broadcast_to(np.arange(len(q))[:, None], corners.shape)
+    # One number for a triple, 0 where there is none: a million links are compared.
+    name = triple @ np.array([9, 3, 1])
+    joined = (name[:, None] != 0) & (name[:, None] == name[corners])
 
-    return _Atlas(q, triple, _number_parts(triple, _roots(len(q), one[joined], other[joined])))
+    return _Atlas(q, triple, _number_parts(name, _roots(len(q), one[joined], corners[joined])))
 
 
 def _chart(leg: FiveBar, chart: int, s: int, cells: int) -> tuple[Array, Bools]:
@@ -302,11 +303,16 @@ def _roots(count: int, one: Ints, other: Ints) -> Ints:
     return root
 
 
-def _number_parts(triple: Ints, root: Ints) -> Ints:
-    """Return each node's part among those of its triple: 1 for the largest, 0 for a sliver."""
+def _number_parts(name: Ints, root: Ints) -> Ints:
+    """Return each node's part among those of its triple: 1 for the largest, 0 for a sliver.
+
+    Args:
+        name: The number of each node's triple; 0 for none.
+        root: The least node of each node's connected part.
+    """
     part = np.zeros(len(root), dtype=int)
-    for signs_of_part in np.unique(triple[triple.any(axis=-1)], axis=0):
-        here = np.flatnonzero((triple == signs_of_part).all(axis=-1))
+    for same in np.unique(name[name != 0]):
+        here = np.flatnonzero(name == same)
         _, which, count = np.unique(root[here], return_inverse=True, return_counts=True)
         # The rank of each part by size; "stable", so that equal parts keep their order.
         rank = np.argsort(np.argsort(-count, kind="stable")) + 1

@@ -57,27 +57,37 @@ class FourBar(NamedTuple):
 
     def gradient(self, q: Array) -> tuple[Array, Array]:
         """Return G [m^2], (...), and dG/dq, (..., 2)."""
-        B, C, _ = self.joints(q)
+        gap, slope_0, slope_1 = self._gap(q[..., 0], q[..., 1])
+        return gap, np.stack([slope_0, slope_1], axis=-1)
+
+    def _gap(self, q_0: Array, q_1: Array) -> tuple[Array, Array, Array]:
+        """Return G and its derivatives by each of the two angles."""
+        B = self.crank * turn(q_0)
+        C = B + self.coupler * turn(q_0 + q_1)
         r = C - self.base
+        size = np.abs(r)
         # Factored: the difference of squares would lose the digits that Newton needs.
-        gap = 0.5 * (np.abs(r) - self.rocker) * (np.abs(r) + self.rocker)
-        return gap, np.stack([self.base * C.imag, -(np.conj(r) * (C - B)).imag], axis=-1)
+        gap = 0.5 * (size - self.rocker) * (size + self.rocker)
+        return gap, self.base * C.imag, -(np.conj(r) * (C - B)).imag
 
     def between(self, q: Array, dq: Array, s: Array) -> Array:
         """Return the poses of the curve at fractions s of the chords from q to q + dq."""
         rounding = np.finfo(float).eps * self.scale**2
-        q = q + s[..., None] * dq
+        # Each angle on its own: most calls are of few poses, and joining them takes longest.
+        q_0 = q[..., 0] + s * dq[..., 0]
+        q_1 = q[..., 1] + s * dq[..., 1]
 
         # Newton squares the relative gap, at first 1e-3: three steps reach rounding.
         for _ in range(3):
-            gap, slope = self.gradient(q)
-            square = _norm2(slope)
+            gap, slope_0, slope_1 = self._gap(q_0, q_1)
+            square = slope_0**2 + slope_1**2
             # A pose that is on the curve to rounding stays: a step there would only add noise.
             off = (np.abs(gap) > rounding) & (square > 0.0)
             step = np.where(off, gap / np.where(off, square, 1.0), 0.0)
-            q = q - step[..., None] * slope
+            q_0 = q_0 - step * slope_0
+            q_1 = q_1 - step * slope_1
 
-        return q
+        return np.stack([q_0, q_1], axis=-1)
 
     def velocity(self, q: Array, dq: Array) -> Complex:
         """Return dF per radian along the curve, in the direction of the chord dq [m], (...)."""

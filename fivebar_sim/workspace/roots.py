@@ -47,11 +47,20 @@ def lowest(f: Callable[[Array], Array], count: int) -> Array:
     golden = 0.5 * (5.0**0.5 - 1.0)
     a = np.zeros(count)
     b = np.ones(count)
+    c = b - golden * (b - a)
+    d = a + golden * (b - a)
+    f_c = f(c)
+    f_d = f(d)
+
     # To 4e-9 of the interval: a minimum is flat, so its value is then exact to rounding.
     for _ in range(40):
-        c = b - golden * (b - a)
-        d = a + golden * (b - a)
-        left = f(c) < f(d)
+        left = f_c < f_d
         a = np.where(left, a, c)
         b = np.where(left, d, b)
+        # One of the two inner places becomes the other, so that one new value is enough.
+        new = np.where(left, b - golden * (b - a), a + golden * (b - a))
+        f_new = f(new)
+        c, d = np.where(left, new, d), np.where(left, c, new)
+        f_c, f_d = np.where(left, f_new, f_d), np.where(left, f_c, f_new)
+
     return 0.5 * (a + b)
