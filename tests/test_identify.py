@@ -246,9 +246,9 @@ def test_refusal_of_a_floor_and_of_logs_that_tell_nothing() -> None:
         parameters(Scenario.load("rail-landing"), [])
     time, ctrl = motion(np.random.default_rng(0), 2.0)
     with pytest.raises(ConfigError, match="commands never change"):
-        check(Measured("x", time, ctrl, np.zeros_like(ctrl)))
+        check(Measured("x", time, ctrl, np.zeros_like(ctrl)), SCENARIO.leg)
     with pytest.raises(ConfigError, match="at least 200 samples, got 100"):
-        check(Measured("x", time[:100], ctrl[:100], ctrl[:100]))
+        check(Measured("x", time[:100], ctrl[:100], ctrl[:100]), SCENARIO.leg)
     apart = Measured("x", time, np.tile([np.pi, 0.0], (len(time), 1)), ctrl)
     short = Case(msgspec.structs.replace(SCENARIO, leg=FiveBar(L2=0.05, L3=0.05)), (0.0, 0.0))
     with pytest.raises(ConfigError, match="x: the leg cannot stand as it begins: the loop is open"):

@@ -68,9 +68,8 @@ def identify(
         raise ConfigError("identify needs at least one LOG")
     loaded = Scenario.load(scenario, settings)
     chosen = parameters(loaded, fit)
-    kt = loaded.servo.kt
-    measured = [read(each, kt) for each in logs]
-    kept = [read(each, kt) for each in held_out]
+    measured = [read(each, loaded) for each in logs]
+    kept = [read(each, loaded) for each in held_out]
     if out is not None:
         written.check(out)
     if motion is not None:

@@ -56,7 +56,8 @@ class Fit(NamedTuple):
         """Correlation of each two numbers, (p, p)."""
         covariance = self.spread.covariance
         sd = np.sqrt(np.diag(covariance))
-        return covariance / np.outer(sd, sd)
+        # What no residual tells at all has no spread either.
+        return covariance / np.maximum(np.outer(sd, sd), 1e-300)
 
 
 class _Problem:

@@ -8,6 +8,10 @@ import numpy as np
 
 from fivebar_sim.arrays import Array, Bools
 from fivebar_sim.errors import ConfigError
+from fivebar_sim.geometry import FiveBar
+from fivebar_sim.kinematics.commanded import check_commands
+from fivebar_sim.kinematics.logged import check_mostly
+from fivebar_sim.logs.clock import check_follows
 
 SETTLED = 1.0
 """Time after which a leg has forgotten how it was held before [s]: until a joint has moved in both
@@ -52,11 +56,12 @@ class Measured(NamedTuple):
         return float(np.median(np.diff(self.time)))
 
 
-def check(log: Measured) -> None:
-    """Raise unless a log can be used.
+def check(log: Measured, leg: FiveBar) -> None:
+    """Raise unless a log can be used for a leg.
 
     Raises:
-        ConfigError: Too short, or a motor that is never moved.
+        ConfigError: Too short, too slow, motors that are never moved, or sent what they never do.
+        LoopOpenError: More than a few of its angles cannot be the leg's.
     """
     if len(log.time) < LEAST:
         raise ConfigError(
@@ -65,3 +70,6 @@ def check(log: Measured) -> None:
     still = np.ptp(log.ctrl, axis=0) == 0.0
     if still.all():
         raise ConfigError(f"{log.name}: the commands never change: nothing can be identified")
+    check_follows(log.interval, log.name)
+    check_mostly(leg, log.time, log.theta, log.name)
+    check_commands(log.theta, log.ctrl, log.name)

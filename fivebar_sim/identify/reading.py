@@ -9,20 +9,22 @@ import numpy as np
 from fivebar_sim import logs
 from fivebar_sim.errors import ConfigError
 from fivebar_sim.identify.measured import Measured, check
+from fivebar_sim.scenario import Scenario
 
 NEEDED = ("theta_A", "theta_E", "ctrl_A", "ctrl_E")
 """The channels without which nothing can be identified."""
 
 
-def read(source: str, kt: float | None) -> Measured:
+def read(source: str, scenario: Scenario) -> Measured:
     """Return a log of a leg that was sent angles.
 
     Args:
         source: A data file, or a TOML file with a table [log]; see `logs.load`.
-        kt: Torque per current [N m/A], for logs of torque; None where it is not known.
+        scenario: The leg that it should be of; its kt makes currents of logged torques.
 
     Raises:
-        ConfigError: The log cannot be read, or lacks a channel.
+        ConfigError: The log cannot be read, lacks a channel, or is read in a wrong unit.
+        LoopOpenError: It is another leg's.
     """
     found = logs.load(Path(source))
     missing = [name for name in NEEDED if not found.has(name)]
@@ -31,6 +33,7 @@ def read(source: str, kt: float | None) -> Measured:
             f"{source}: {', '.join(missing)} is missing: identify compares the motors' angles with "
             "the angles that they were sent"
         )
+    kt = scenario.servo.kt
     names = [*NEEDED]
     scale = 1.0
     if found.has("current_A", "current_E"):
@@ -52,5 +55,5 @@ def read(source: str, kt: float | None) -> Measured:
         ctrl=values[:, 2:4],
         current=values[:, 4:6] / scale if len(names) > len(NEEDED) else None,
     )
-    check(log)
+    check(log, scenario.leg)
     return log

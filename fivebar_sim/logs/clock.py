@@ -20,6 +20,10 @@ JUMP = 1000.0
 LONG = 60.0
 
 
+SLOWEST = 0.2
+"""Longest usual interval of a log that is laid over a run [s]: a leg does more within one."""
+
+
 class Gap(NamedTuple):
     """An interval without rows.
 
@@ -82,6 +86,30 @@ def order(time: Array, values: Array, jumps: str, where: str) -> Ordered:
         time, values = _mended(time, values, cuts, interval, jumps, where, remarks)
     gaps = gaps_of(time, interval)
     return Ordered(time, values, interval, gaps, tuple(remarks))
+
+
+def check_follows(interval: float, where: str) -> None:
+    """Raise unless rows come often enough to tell how a leg moved.
+
+    Args:
+        interval: The usual time between two rows [s].
+        where: The log, for messages.
+
+    Raises:
+        ConfigError: They do not; guesses in which unit the times are.
+    """
+    if interval <= SLOWEST:
+        return
+    guess = ""
+    for unit, scale in (("ms", 1e-3), ("us", 1e-6), ("ns", 1e-9)):
+        if scale * interval <= SLOWEST:
+            said = f"{units.text(scale * interval, 's', 3)} if the times are in {unit}"
+            guess = f"; a guess: it is {said}: time with unit = '{unit}'"
+            break
+    raise ConfigError(
+        f"{where}: rows are {interval:.4g} s apart, too far to tell how a leg moved, which takes "
+        f"{SLOWEST:g} s or less{guess}"
+    )
 
 
 def is_jump(step: Array, interval: float) -> Bools:

@@ -11,7 +11,9 @@ import numpy as np
 from fivebar_sim import kinematics
 from fivebar_sim.arrays import Array, Bools
 from fivebar_sim.errors import ConfigError
+from fivebar_sim.kinematics.commanded import check_commands
 from fivebar_sim.logs import Log
+from fivebar_sim.logs.clock import check_follows
 from fivebar_sim.metrics.columns import Record, motors
 from fivebar_sim.overlay import align
 from fivebar_sim.overlay.measured import check_leg
@@ -168,9 +170,12 @@ def compare(scenario: Scenario, log: Log, settled: float = SETTLED) -> Compared:
     check_leg(scenario)
     if not log.has("theta_A", "theta_E"):
         raise ConfigError(f"{log.where}: theta_A and theta_E are needed to lay a log over a run")
+    check_follows(log.interval, log.where)
     is_played = log.has("ctrl_A", "ctrl_E")
     # For its check alone where the commands are not played.
     Angles.of_log(log).of_leg(scenario.leg)
+    if is_played:
+        check_commands(log.pair("theta"), log.pair("ctrl"), log.where)
     ran = played(scenario, log) if is_played else scenario
     record = run(ran).record
     time, theta = log.complete("theta_A", "theta_E")
