@@ -171,7 +171,8 @@ def _of_robot(scenario: RobotScenario, record: Record) -> Replay:
     robot = scenario.robot
     built = model.build_robot(robot, scenario.scene)
     legs = [of_leg(record, name) for name in LEGS]
-    joints = [side_by_side(leg, JOINT_COLUMNS) for leg in legs]
+    own = JOINT_COLUMNS if robot.side_step is None else (places.SWING, *JOINT_COLUMNS)
+    joints = [side_by_side(leg, own) for leg in legs]
     rows = len(record["time"])
     body = trunk(record)
     if body is None:

@@ -19,6 +19,8 @@ ROWS = (
     ("torque_rms.E", "torque E RMS", "load.torque_rms.E"),
     ("torque_peak.A", "torque A peak", "load.torque_peak.A"),
     ("torque_peak.E", "torque E peak", "load.torque_peak.E"),
+    ("side_rms", "torque S RMS", "load.torque_rms.A"),
+    ("side_peak", "torque S peak", "load.torque_peak.A"),
     ("share_A", "load share A", "load.share_A"),
     ("share_of_robot", "part of all torque", "load.share_A"),
     ("weight_share", "part of the weight", "load.share_A"),

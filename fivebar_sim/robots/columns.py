@@ -8,6 +8,7 @@ from fivebar_sim.arrays import Array
 from fivebar_sim.metrics.columns import COLUMNS, Record, side_by_side
 from fivebar_sim.robots.floor import Floor, Scene
 from fivebar_sim.robots.measure import Trunk
+from fivebar_sim.robots.places import SWING, SWING_RATE
 from fivebar_sim.robots.robot import LEGS
 
 POSITION_COLUMNS = ("trunk_x", "trunk_y", "trunk_z")
@@ -29,10 +30,20 @@ FORCE_COLUMNS = ("ground_x", "ground_y", "ground_z")
 """The floor's force on a foot, along the world's axes [N]."""
 
 
-def columns(scene: Scene) -> list[str]:
-    """Return the columns of a robot's record in a scene, in their order."""
+SIDE_COLUMNS = (SWING, SWING_RATE, "ctrl_S", "torque_S")
+"""Of the motor S of a leg that has one: angle, rate, command [rad] and torque [N m]."""
+
+
+def columns(scene: Scene, *, side_step: bool = False) -> list[str]:
+    """Return the columns of a robot's record in a scene, in their order.
+
+    Args:
+        scene: What it stands on.
+        side_step: Whether its legs have a motor S.
+    """
     free = isinstance(scene, Floor)
-    own = [*COLUMNS[1:], *FORCE_COLUMNS] if free else list(COLUMNS[1:])
+    sides = SIDE_COLUMNS if side_step else ()
+    own = [*COLUMNS[1:], *sides, *(FORCE_COLUMNS if free else ())]
     legs = [f"{leg}_{name}" for leg in LEGS for name in own]
     return ["time", *(TRUNK_COLUMNS if free else ()), *legs]
 

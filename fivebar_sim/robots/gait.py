@@ -4,17 +4,18 @@ from __future__ import annotations
 
 import msgspec
 import numpy as np
-from numpy.typing import ArrayLike
 
 from fivebar_sim.checks import check_number
 from fivebar_sim.errors import ArgumentError, unknown
-from fivebar_sim.paths import FootPath, Sample
+from fivebar_sim.paths import FootPath
+from fivebar_sim.robots.ahead import Ahead
 from fivebar_sim.robots.robot import LEGS, Robot
+from fivebar_sim.robots.sideways import sided
 
 TROT = {"FL": 0.0, "FR": 0.5, "RL": 0.5, "RR": 0.0}
 """Phases of a trot: the legs of a diagonal together, the two diagonals half a period apart."""
 
-TOGETHER = dict.fromkeys(LEGS, 0.0)
+TOGETHER: dict[str, float] = dict.fromkeys(LEGS, 0.0)
 """Phases of legs that all do the same at the same time."""
 
 PHASES = {
@@ -43,15 +44,19 @@ class Gait(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
         phases: By what part of a period each leg is ahead of the path.
         strides: What the path's x is multiplied by for each leg, about the middle of its range;
             None: 1 for every leg.
+        sideways: What the path's x, from the middle of its range, is multiplied by to give the
+            foot's way to the left, with the motor S; None: 0 for every leg.
     """
 
     path: FootPath
     phases: dict[str, float]
     strides: dict[str, float] | None = None
+    sideways: dict[str, float] | None = None
 
     def __post_init__(self) -> None:
         _check_legs("phases", self.phases)
         _check_legs("strides", self.strides or dict.fromkeys(LEGS, 1.0))
+        _check_legs("sideways", self.sideways or TOGETHER)
         if self.path.period is None and any(self.phases.values()):
             raise ArgumentError("phases must all be 0: the path does not repeat")
 
@@ -72,62 +77,24 @@ class Gait(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
         middle = 0.5 * float(x.min() + x.max())
 
         strides = self.strides or dict.fromkeys(LEGS, 1.0)
-        return {
-            leg: Ahead(
+        sideways = self.sideways or TOGETHER
+        if any(sideways.values()) and robot.side_step is None:
+            raise ArgumentError("sideways must all be 0: the robot has no hips.side_step")
+
+        found: dict[str, FootPath] = {}
+        for leg in LEGS:
+            hip = robot.hips[leg]
+            ahead = Ahead(
                 ramp=self.path.ramp,
                 outside=self.path.outside,
                 path=self.path,
                 phase=self.phases[leg],
                 stride=strides[leg],
                 middle=middle,
-                mirrored=robot.hips[leg].mirrored,
+                mirrored=hip.mirrored,
             )
-            for leg in LEGS
-        }
-
-
-class Ahead(FootPath, frozen=True, tag="ahead"):
-    """The path of one leg of a gait: another path, some part of its period ahead.
-
-        x(t) = +-(m + stride (x_path(t + phase T) - m)),   z(t) = z_path(t + phase T)
-
-    Attributes:
-        path: The gait's path.
-        phase: Parts of its period T that the leg is ahead.
-        stride: What its x is multiplied by, about `middle`.
-        middle: m, the middle of the path's x [m].
-        mirrored: Whether x of the leg's hip frame points backward: then all of x is negative.
-    """
-
-    path: FootPath
-    phase: float
-    stride: float
-    middle: float
-    mirrored: bool
-
-    @property
-    def period(self) -> float | None:
-        """Time after which the path repeats [s]; None where it does not."""
-        return self.path.period
-
-    @property
-    def span(self) -> float:
-        """How long the path is defined [s]."""
-        return self.path.span
-
-    @property
-    def moves(self) -> float:
-        """How long the foot moves [s]."""
-        return self.path.moves
-
-    def nominal(self, time: ArrayLike) -> Sample:
-        """Return the other path at a later time, its x scaled; see `FootPath.nominal`."""
-        period = self.path.period or 0.0
-        p = self.path.nominal(self._times(time) + self.phase % 1.0 * period)
-        sign = -1.0 if self.mirrored else 1.0
-        scale = np.array([sign * self.stride, 1.0])
-        offset = np.array([sign * (1.0 - self.stride) * self.middle, 0.0])
-        return Sample(scale * p.position + offset, scale * p.velocity, scale * p.acceleration)
+            found[leg] = ahead if hip.side_step is None else sided(ahead, sideways[leg], hip)
+        return found
 
 
 def _check_legs(key: str, values: dict[str, float]) -> None:

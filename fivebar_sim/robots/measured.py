@@ -62,6 +62,8 @@ class LegTable(Table, frozen=True):
         share_A: A's part of the leg's absolute torque impulse.
         share_of_robot: The leg's part of that of all eight motors.
         saturated: Part of the steps in which the torque limit clipped each motor.
+        side_rms: Torque of the motor S, RMS [N m]; unset of legs without one.
+        side_peak: Its largest torque [N m]; unset as above.
         heat: Mean copper heat of each motor [W]; unset where the winding is not known.
         duty: Part of the time in which the foot stands; unset in the air, as is all below.
         slip: Distance that the foot slid while it stood [m].
@@ -75,6 +77,8 @@ class LegTable(Table, frozen=True):
     share_A: Part
     share_of_robot: Part
     saturated: Parts
+    side_rms: Amount | msgspec.UnsetType = msgspec.UNSET
+    side_peak: Amount | msgspec.UnsetType = msgspec.UNSET
     heat: Motors | msgspec.UnsetType = msgspec.UNSET
     duty: Part | msgspec.UnsetType = msgspec.UNSET
     slip: Amount | msgspec.UnsetType = msgspec.UNSET

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from fivebar_sim import kinematics
 from fivebar_sim.arrays import Array
@@ -12,6 +13,12 @@ from fivebar_sim.metrics.columns import JOINT_COLUMNS, side_by_side
 from fivebar_sim.robots.ground import Ground
 from fivebar_sim.robots.measure import Trunk
 from fivebar_sim.robots.robot import Hip, Robot
+
+SWING = "theta_S"
+"""The column of the motor S of a leg that has one [rad]."""
+
+SWING_RATE = "theta_dot_S"
+"""Its rate [rad/s]."""
 
 
 def rotation(quaternion: Array) -> Array:
@@ -28,16 +35,35 @@ def rotation(quaternion: Array) -> Array:
     return np.moveaxis(np.array(rows), -1, 0)
 
 
-def in_trunk(hip: Hip, points: Array) -> Array:
-    """Return points (x, z) of a leg's hip frame in the trunk's frame [m], (..., 2) to (..., 3)."""
+def in_trunk(hip: Hip, points: Array, swing: ArrayLike = 0.0) -> Array:
+    """Return points (x, z) of a leg's hip frame in the trunk's frame [m], (..., 2) to (..., 3).
+
+    Args:
+        hip: Where the leg is.
+        points: The points [m].
+        swing: Angle of the motor S [rad], (...).
+    """
     sign = -1.0 if hip.mirrored else 1.0
-    zero = np.zeros_like(points[..., 0])
-    return np.array(hip.pos) + np.stack([sign * points[..., 0], zero, points[..., 1]], axis=-1)
+    x = sign * points[..., 0]
+    if hip.side_step is None:
+        zero = np.zeros_like(x)
+        return np.array(hip.pos) + np.stack([x, zero, points[..., 1]], axis=-1)
+
+    cos = np.cos(swing)
+    sin = np.sin(swing)
+    out = hip.across
+    up = hip.side_step.along + points[..., 1]
+    turned = np.stack([x, out * cos - up * sin, out * sin + up * cos], axis=-1)
+    return np.array(hip.axis) + turned
 
 
-def in_world(trunk: Trunk, hip: Hip, points: Array) -> Array:
-    """Return points (x, z) of a leg's hip frame in the world after each step [m], (N, 3)."""
-    turned = np.einsum("nij,nj->ni", rotation(trunk.quaternion), in_trunk(hip, points))
+def in_world(trunk: Trunk, hip: Hip, points: Array, swing: ArrayLike = 0.0) -> Array:
+    """Return points (x, z) of a leg's hip frame in the world after each step [m], (N, 3).
+
+    Arguments besides the trunk are those of `in_trunk`.
+    """
+    inside = in_trunk(hip, points, swing)
+    turned = np.einsum("nij,nj->ni", rotation(trunk.quaternion), inside)
     return trunk.position + turned
 
 
@@ -49,7 +75,8 @@ def feet(trunk: Trunk, hip: Hip, record: Mapping[str, Array]) -> Array:
         hip: Where the leg is.
         record: The leg's columns, without its name in front.
     """
-    return in_world(trunk, hip, side_by_side(record, ("foot_x", "foot_z")))
+    foot = side_by_side(record, ("foot_x", "foot_z"))
+    return in_world(trunk, hip, foot, record.get(SWING, 0.0))
 
 
 def slid(
@@ -79,8 +106,14 @@ def slid(
     axes = rotation(trunk.quaternion)
     # An angle that turns +x of the hip frame to +z is a turn about -y of the frame.
     sign = 1.0 if hip.mirrored else -1.0
-    leg_turns = sign * (record["theta_dot_A"] + record["theta_dot_B"])[:, None] * axes[:, :, 1]
-    turns = np.einsum("nij,nj->ni", axes, trunk.turning) + leg_turns
+    rate = sign * (record["theta_dot_A"] + record["theta_dot_B"])[:, None]
+    turns = np.einsum("nij,nj->ni", axes, trunk.turning)
+    if hip.side_step is None:
+        turns = turns + rate * axes[:, :, 1]
+    else:
+        swing = record[SWING][:, None]
+        across = np.cos(swing) * axes[:, :, 1] + np.sin(swing) * axes[:, :, 2]
+        turns = turns + rate * across + record[SWING_RATE][:, None] * axes[:, :, 0]
     r = robot.leg.foot_radius
     if ground is not None and not ground.level:
         place = feet(trunk, hip, record)
@@ -109,7 +142,8 @@ def depths(robot: Robot, trunk: Trunk, hip: Hip, record: Mapping[str, Array]) ->
     joints = {"A": A, "B": points.B, "D": points.D, "E": E}
     if leg.L6 > max(leg.foot_radius - leg.radius, 0.0):
         joints["C"] = points.C_left
-    heights = {name: in_world(trunk, hip, place)[:, 2] for name, place in joints.items()}
+    swing = record.get(SWING, 0.0)
+    heights = {name: in_world(trunk, hip, place, swing)[:, 2] for name, place in joints.items()}
     return {
         f"joint {name}": np.maximum(leg.radius - height, 0.0) for name, height in heights.items()
     }

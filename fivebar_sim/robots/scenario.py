@@ -23,7 +23,7 @@ from fivebar_sim.metrics.catalogue import (
 from fivebar_sim.metrics.guards import Guards
 from fivebar_sim.robots.floor import KINDS, Air, Floor, Payload
 from fivebar_sim.robots.floor import Scene as Stage
-from fivebar_sim.robots.gait import PHASES, Gait
+from fivebar_sim.robots.gait import PHASES, TOGETHER, Gait
 from fivebar_sim.robots.ground import KINDS as GROUNDS
 from fivebar_sim.robots.ground import Ground
 from fivebar_sim.robots.push import Push
@@ -50,6 +50,7 @@ class RobotScenario(Scenario, frozen=True, kw_only=True):
         robot: The robot.
         phases: By what part of a period each leg is ahead of the path.
         strides: What the path's x is multiplied by for each leg; None: 1 for every leg.
+        sideways: What it is multiplied by for each foot's way to the left; None: 0 for every leg.
         scene: What the robot stands on.
         pushes: Forces on its trunk.
     """
@@ -57,6 +58,7 @@ class RobotScenario(Scenario, frozen=True, kw_only=True):
     robot: Robot
     phases: dict[str, float]
     strides: dict[str, float] | None = None
+    sideways: dict[str, float] | None = None
     scene: Stage = Floor()
     pushes: tuple[Push, ...] = ()
     known_limits: ClassVar[tuple[str, ...]] = ROBOT_KEYS
@@ -73,7 +75,9 @@ class RobotScenario(Scenario, frozen=True, kw_only=True):
     @property
     def gait(self) -> Gait:
         """What the feet do."""
-        return Gait(path=self.path, phases=self.phases, strides=self.strides)
+        return Gait(
+            path=self.path, phases=self.phases, strides=self.strides, sideways=self.sideways
+        )
 
     @classmethod
     def from_table(cls, table: Table, where: str, folder: Path) -> RobotScenario:
@@ -89,7 +93,7 @@ class RobotScenario(Scenario, frozen=True, kw_only=True):
         robot = read_robot(table["robot"], where, folder)
         path = reading.path(table.get("path"), where, folder)
         gait = table.get("gait", {})
-        phases, strides = _gait(gait, where)
+        phases, strides, sideways = _gait(gait, where)
         scene = _scene(table.get("scene", "floor"), where)
 
         parts = {
@@ -100,6 +104,7 @@ class RobotScenario(Scenario, frozen=True, kw_only=True):
             "path": path,
             "phases": phases,
             "strides": strides,
+            "sideways": sideways,
             "controller": controller,
             "controller_name": controller_name,
             "scene": scene,
@@ -124,6 +129,8 @@ class RobotScenario(Scenario, frozen=True, kw_only=True):
             table.pop(key)
         changed = msgspec.structs.replace(self.robot, servo=self.servo)
         gait = {"phases": self.phases, "strides": self.strides or dict.fromkeys(LEGS, 1.0)}
+        if self.sideways and any(self.sideways.values()):
+            gait["sideways"] = self.sideways
         own = {"name": table.pop("name"), "robot": changed.table(), "gait": gait, **table}
         if self.pushes:
             own["push"] = [msgspec.to_builtins(push) for push in self.pushes]
@@ -174,11 +181,13 @@ def _merge(table: Table, own: Table) -> None:
             table[key] = value
 
 
-def _gait(table: Any, where: str) -> tuple[dict[str, float], dict[str, float]]:
-    """Return phases and strides of the table [gait]."""
+def _gait(
+    table: Any, where: str
+) -> tuple[dict[str, float], dict[str, float], dict[str, float] | None]:
+    """Return phases, strides and ways to the side of the table [gait]."""
     if not isinstance(table, dict):
         raise ConfigError(f"{where}: gait must be a table, got {table!r}")
-    tables.check_keys(table, ("phases", "strides"), f"{where}: [gait]")
+    tables.check_keys(table, ("phases", "strides", "sideways"), f"{where}: [gait]")
     phases = table.get("phases", "together")
     if isinstance(phases, str):
         if phases not in PHASES:
@@ -186,10 +195,12 @@ def _gait(table: Any, where: str) -> tuple[dict[str, float], dict[str, float]]:
         phases = PHASES[phases]
 
     strides = table.get("strides", dict.fromkeys(LEGS, 1.0))
-    for key, value in (("phases", phases), ("strides", strides)):
+    sideways = table.get("sideways")
+    given = {"phases": phases, "strides": strides, "sideways": sideways or TOGETHER}
+    for key, value in given.items():
         if not isinstance(value, dict):
             raise ConfigError(f"{where}: gait.{key} must be a table of the legs, got {value!r}")
-    return dict(phases), dict(strides)
+    return dict(phases), dict(strides), None if sideways is None else dict(sideways)
 
 
 def _scene(value: Any, where: str) -> Stage:
@@ -255,6 +266,8 @@ def _check_together(scenario: RobotScenario) -> None:
     except ArgumentError as error:
         raise ConfigError(f"gait.{error}") from None
 
+    if any((scenario.sideways or TOGETHER).values()) and scenario.robot.side_step is None:
+        raise ConfigError("gait.sideways needs a robot with hips.side_step: its legs have no S")
     check_window(scenario)
     if scenario.servo.records_friction:
         raise ConfigError(

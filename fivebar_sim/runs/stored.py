@@ -167,7 +167,8 @@ def _check_plausible(file: Path, record: Record, timestep: float) -> None:
 def _common_columns(scenario: Scenario) -> list[str]:
     """Return the columns that every record of a leg has, or all of a robot's."""
     if isinstance(scenario, RobotScenario):
-        return robots_columns(scenario.scene)
+        sided = scenario.robot.side_step is not None
+        return robots_columns(scenario.scene, side_step=sided)
     return list(COLUMNS)
 
 

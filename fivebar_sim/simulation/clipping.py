@@ -58,12 +58,14 @@ class Clipping(NamedTuple):
         kd: Gains on the rate, within what the limit clips [N m s/rad], (n, 1, motors).
         limit: Largest torques [N m], (n, 1, motors).
         late: Whether the spring acts at the end of a step, not at its start, (n, 1, 1).
+        joints: Where the motors' joints are in qpos and qvel, from their ends.
     """
 
     kp: Array
     kd: Array
     limit: Array
     late: Bools
+    joints: slice | Integers
 
     @classmethod
     def of(cls, models: Sequence[mujoco.MjModel]) -> Clipping | None:
@@ -81,7 +83,9 @@ class Clipping(NamedTuple):
         limit = np.where(limited, most, UNLIMITED)
         discrete = mujoco.mjtIntegrator.mjINT_DISCRETE
         late = np.array([built.opt.integrator == discrete for built in models])
-        return cls(kp[:, None], kd[:, None], limit[:, None], late[:, None, None])
+        return cls(
+            kp[:, None], kd[:, None], limit[:, None], late[:, None, None], _joints(models[0])
+        )
 
     @property
     def motors(self) -> int:
@@ -90,7 +94,7 @@ class Clipping(NamedTuple):
 
     def rows(self, ids: Integers) -> Clipping:
         """Return the servos of some simulations."""
-        return Clipping(self.kp[ids], self.kd[ids], self.limit[ids], self.late[ids])
+        return Clipping(self.kp[ids], self.kd[ids], self.limit[ids], self.late[ids], self.joints)
 
     def begun(self, u: Array, q: Array, v: Array) -> Integers:
         """Return the modes that MuJoCo chooses with the states before steps, (n, N, motors)."""
@@ -123,6 +127,16 @@ class Clipping(NamedTuple):
         acting = q + (push + self.kd * v) / self.kp
         lacks = np.where(modes == 0, self.kp * (u - acting), 0.0)
         return np.concatenate([acting, lacks], axis=-1)
+
+
+def _joints(model: mujoco.MjModel) -> slice | Integers:
+    """Return where the motors' joints are in qpos and qvel, from their ends."""
+    motors = motors_of(model)
+    found = model.jnt_dofadr[model.actuator_trnid[-motors:, 0]].astype(np.int64) - model.nv
+    # Every other joint of legs that have no more than A, B, E and D: a slice is faster.
+    usual = slice(-2 * motors, None, 2)
+    alike = np.array_equal(found, np.arange(-2 * motors, 0, 2))
+    return usual if alike else found
 
 
 def clipped(offset: Array, slope: Array, limit: Array) -> Array:

@@ -125,9 +125,9 @@ class _Part:
             WARMSTART: stepper.qacc_warmstart[ids],
         }
         self._nq = stepper.qpos.shape[1]
-        # The motors are the last actuators; A and E are every other of a leg's joints.
+        # The motors are the last actuators.
         self._own = slice(-clipping.motors, None)
-        self._joints = slice(-2 * clipping.motors, None, 2)
+        self._joints = clipping.joints
 
     def take(self, ctrl: Array, most: Integers) -> None:
         """Take steps; of each simulation the first wrong one is taken again, and is the last.

@@ -34,6 +34,11 @@ def balance(went: Walk) -> Balance:
     ground = meter.ground(w) if isinstance(planned.scene, Floor) else np.zeros(len(v))
     torque = np.concatenate([motors(of_leg(went.record, leg), "torque") for leg in LEGS], axis=1)
     turning = w[:, _motors(planned.model)]
+    motor = np.sum(torque * turning, axis=1)
+    if planned.robot.side_step is not None:
+        sides = [planned.robot.joints * (k - len(LEGS)) for k in range(len(LEGS))]
+        swung = np.stack([went.record[f"{leg}_torque_S"] for leg in LEGS], axis=1)
+        motor += np.sum(swung * w[:, sides], axis=1)
     constraint = went.states.constraint[0]
 
     start = planned.start
@@ -42,7 +47,7 @@ def balance(went: Walk) -> Balance:
         np.linalg.norm(planned.model.opt.gravity)
     )
     return Balance(
-        motor=h * np.sum(torque * turning, axis=1),
+        motor=h * motor,
         force=h * meter.pushed(w),
         ground=ground,
         constraints=h * np.sum(constraint * w, axis=1) - ground,

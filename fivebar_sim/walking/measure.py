@@ -17,7 +17,7 @@ from fivebar_sim.metrics.measured import Measured
 from fivebar_sim.metrics.sharing import Load
 from fivebar_sim.robots import LEGS, Floor, places, together
 from fivebar_sim.robots import measured as robots
-from fivebar_sim.robots.columns import of_leg
+from fivebar_sim.robots.columns import SIDE_COLUMNS, of_leg
 from fivebar_sim.robots.floor import load
 from fivebar_sim.robots.ground import Flat
 from fivebar_sim.robots.measure import measure as how_it_moved
@@ -28,6 +28,9 @@ from fivebar_sim.simulation.measure import Unrecorded, heating_of, load_of
 from fivebar_sim.walking import energy as whole_energy
 from fivebar_sim.walking.guards import Seen, judge
 from fivebar_sim.walking.walk import Walk, jumped, saturated
+
+SIDE_TORQUE = SIDE_COLUMNS[-1]
+"""The column of the motor S's torque."""
 
 NOWHERE = 0.01
 """Body lengths below which a way is none: a cost of transport over it would mean nothing."""
@@ -248,10 +251,15 @@ def _legs(legs: list[Leg], window: slice) -> dict[str, LegTable]:
 
     for leg, effort, weight in zip(legs, efforts, weights, strict=True):
         error = tracking.tracking_error(leg.record)[window]
-        grounded: dict[str, Any] = {}
+        besides: dict[str, Any] = {}
+
+        if SIDE_TORQUE in leg.record:
+            swung = leg.record[SIDE_TORQUE][window]
+            besides["side_rms"] = tracking.root_mean_square(swung)
+            besides["side_peak"] = float(np.abs(swung).max())
 
         if leg.force is not None and leg.slid is not None:
-            grounded = {
+            besides |= {
                 "duty": float((leg.force[window] > 0.0).mean()),
                 "slip": float(leg.slid[window].sum()),
                 "weight_share": weight / sum(weights) if sum(weights) > 0.0 else None,
@@ -266,6 +274,6 @@ def _legs(legs: list[Leg], window: slice) -> dict[str, LegTable]:
             share_of_robot=effort / sum(efforts) if sum(efforts) > 0.0 else None,
             saturated=leg.load.saturated,
             heat=leg.load.heat,
-            **grounded,
+            **besides,
         )
     return found

@@ -23,7 +23,7 @@ from fivebar_sim.recording.plots import Series
 from fivebar_sim.recording.poses import Room, Rows, drawn_motion, drawn_rows
 from fivebar_sim.recording.summary import summary
 from fivebar_sim.render import palette
-from fivebar_sim.robots import LEGS, Floor, Robot, places
+from fivebar_sim.robots import LEGS, Floor, Hip, Robot, places
 from fivebar_sim.robots.columns import of_leg, trunk
 from fivebar_sim.robots.measure import Trunk, heading, lean
 from fivebar_sim.robots.scenario import RobotScenario
@@ -137,8 +137,11 @@ def _send_leg(
         translation=hip.pos,
         quaternion=rr.Quaternion(xyzw=TURNED if hip.mirrored else (0.0, 0.0, 0.0, 1.0)),
     )
-    stream.log(root, fixed, static=True)
     record = of_leg(run.record, name)
+    if hip.side_step is None:
+        stream.log(root, fixed, static=True)
+    else:
+        stream.send_columns(root, drawn, _swinging(hip, record[places.SWING][rows]))
     # Without the ground: the hip hangs on the trunk, not on a rail.
     moved = drawn_motion(_in_air(record), rows)
     own = look._replace(root=f"{root}/", label=look.label and name)
@@ -150,6 +153,20 @@ def _send_leg(
         colors=[look.colour(shade("target"))],
     )
     stream.log(f"{root}/{foot.TARGET_PATH}", path, static=True)
+
+
+def _swinging(hip: Hip, swing: Array) -> rr.ComponentColumnList:
+    """Return where a leg's hip frame is in the trunk's, as its motor S turns it [rad]."""
+    import rerun as rr
+
+    half = 0.5 * swing
+    still = np.zeros_like(half)
+    # Turned about x; of a mirrored leg after half a turn about z.
+    turned = [still, -np.sin(half), np.cos(half), still]
+    straight = [np.sin(half), still, still, np.cos(half)]
+    quaternion = np.stack(turned if hip.mirrored else straight, axis=-1)
+    origin = places.in_trunk(hip, np.zeros((len(swing), 2)), swing)
+    return rr.Transform3D.columns(translation=origin, quaternion=quaternion)
 
 
 def _in_air(record: Record) -> Record:

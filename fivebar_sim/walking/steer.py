@@ -37,12 +37,12 @@ def steered(planned: RobotPlan) -> States:
 
     for k in range(0, steps, every):
         commands = _commands(planned, asked, k, latest)[:, : steps - k]
-        # Pushes, then one leg's motors beside the other's, as in ctrl.
-        pushes = planned.pushes[k : k + every]
-        parts.append(robot.advance(np.concatenate([pushes, *commands], axis=-1)[None]))
+        # What else there is, then one leg's motors beside the other's, as in ctrl.
+        besides = planned.besides[k : k + every]
+        parts.append(robot.advance(np.concatenate([besides, *commands], axis=-1)[None]))
         if is_broken(parts[-1], slice(None)):
             break
-        latest = _seen(parts[-1])
+        latest = _seen(parts[-1], planned.robot.joints)
     return States.joined(parts)
 
 
@@ -65,10 +65,15 @@ def _commands(planned: RobotPlan, asked: Asked, k: int, latest: Latest | None) -
     return sent
 
 
-def _seen(states: States) -> Latest:
-    """Return angles and rates of each leg's motors after some steps, (4, n, 2) each."""
-    count = 4 * len(LEGS)
-    shape = (-1, len(LEGS), 4)
-    q = states.qpos[0, :, -count:].reshape(shape)[..., MOTOR_JOINTS]
-    v = states.qvel[0, :, -count:].reshape(shape)[..., MOTOR_JOINTS]
+def _seen(states: States, joints: int) -> Latest:
+    """Return angles and rates of each leg's motors after some steps, (4, n, 2) each.
+
+    Args:
+        states: The states.
+        joints: How many joints a leg has; A, B, E and D are the last.
+    """
+    count = joints * len(LEGS)
+    shape = (-1, len(LEGS), joints)
+    q = states.qpos[0, :, -count:].reshape(shape)[..., -4:][..., MOTOR_JOINTS]
+    v = states.qvel[0, :, -count:].reshape(shape)[..., -4:][..., MOTOR_JOINTS]
     return np.swapaxes(q, 0, 1), np.swapaxes(v, 0, 1)

@@ -11,7 +11,7 @@ from fivebar_sim.arrays import Array, Bools
 from fivebar_sim.errors import DivergedError
 from fivebar_sim.metrics.columns import Record
 from fivebar_sim.robots import LEGS, Floor
-from fivebar_sim.robots.columns import FORCE_COLUMNS, TRUNK_COLUMNS, trunk
+from fivebar_sim.robots.columns import FORCE_COLUMNS, SIDE_COLUMNS, TRUNK_COLUMNS, trunk
 from fivebar_sim.robots.jump import Jump, jump
 from fivebar_sim.robots.measure import Fall, Trunk, falls
 from fivebar_sim.simulation import record as recorded
@@ -61,7 +61,7 @@ def walk(planned: RobotPlan, watch: Watch | None = None) -> Walk:
     """
     if planned.setpoints is None:
         return of_states(planned, steered(planned))
-    table = np.concatenate([planned.pushes, planned.setpoints], axis=1)
+    table = np.concatenate([planned.besides, planned.setpoints], axis=1)
     states = simulate(planned.model, planned.start[None], table[None], watch=watch)
     return of_states(planned, states)
 
@@ -77,7 +77,7 @@ def walk_all(plans: Sequence[RobotPlan], nthread: int = 1) -> list[Walk]:
         DivergedError: A simulation broke down; says which, and when.
     """
     tables = [
-        np.concatenate([planned.pushes, planned.setpoints], axis=1)
+        np.concatenate([planned.besides, planned.setpoints], axis=1)
         for planned in plans
         if planned.setpoints is not None
     ]
@@ -132,11 +132,30 @@ def _leg(planned: RobotPlan, states: States, k: int) -> Record:
     part = _part(planned, states, k)
     record = recorded.columns(planned.legs[k], part, recorded.points(planned.legs[k], part))
     del record["time"]
+    if planned.robot.side_step is not None:
+        record |= _side(planned, states, k)
     # Held out of reach of the floor, a foot has a sensor of its force too.
     if isinstance(planned.scene, Floor):
         force = wrench(states, k)[:, : len(FORCE_COLUMNS)]
         record |= dict(zip(FORCE_COLUMNS, force.T, strict=True))
     return {name: np.ascontiguousarray(column) for name, column in record.items()}
+
+
+def _side(planned: RobotPlan, states: States, k: int) -> Record:
+    """Return the columns of the motor S of leg k.
+
+    tau = kp (u - theta) - kd theta_dot,   at a step's end; under `implicitfast` theta at its start
+    """
+    side_step = planned.robot.side_step
+    assert side_step is not None
+    place = planned.robot.joints * (k - len(LEGS))
+    theta = states.qpos[0, :, place]
+    rate = states.qvel[0, :, place]
+    command = planned.swings[:, k]
+    late = planned.sim.integrator == "discrete"
+    acting = theta if late else np.concatenate([planned.start[place][None], theta[:-1]])
+    torque = side_step.kp * (command - acting) - side_step.kd * rate
+    return dict(zip(SIDE_COLUMNS, (theta, rate, command, torque), strict=True))
 
 
 def wrench(states: States, k: int) -> Array:
@@ -163,8 +182,10 @@ def saturated(went: Walk, k: int) -> Bools:
 
 def _part(planned: RobotPlan, states: States, k: int) -> Part:
     """Return all steps of leg k, as if it were alone."""
-    # The legs' joints are the last of the robot's, four each.
-    joints = slice(4 * (k - len(LEGS)), 4 * (k + 1 - len(LEGS)) or None)
+    # The legs' joints are the last of the robot's; any S comes before a leg's other four.
+    width = planned.robot.joints
+    last = width * (k + 1 - len(LEGS))
+    joints = slice(last - 4, last or None)
     motors = slice(2 * (k - len(LEGS)), 2 * (k + 1 - len(LEGS)) or None)
     own = states._replace(
         qpos=states.qpos[..., joints],
