@@ -168,6 +168,8 @@ def _last(before: Array, new: Array) -> Array:
 
     Always a copy.
     """
+    if new.shape == before.shape:
+        return new.copy()
     keep = before.shape[1]
     if new.shape[1] >= keep:
         return new[:, new.shape[1] - keep :].copy()

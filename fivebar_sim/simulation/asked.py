@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import repeat
 from typing import Any, NamedTuple, cast
 
 import numpy as np
@@ -62,9 +63,9 @@ class Asked:
         )
 
         wanted = _references([p.motion for p in plans])
-        self._payload = wanted.payload
         # Yields the rows of one control step after the other: cheaper than an index for each.
-        self._wanted = zip(*(field[::every] for field in wanted[:-1]), strict=True)
+        fields = (field[::every] for field in wanted[:-1])
+        self._wanted = map(Reference._make, zip(*fields, repeat(wanted.payload)))
         self._commands: list[Any] = []
         self._seen: list[Array] = []
 
@@ -82,8 +83,8 @@ class Asked:
         if latest is not None:
             self._step.moved(*latest)
         seen = self._step.observe(k)
-        wanted = Reference(*next(self._wanted), payload=self._payload)
-        command = answer_of(self.name, self._ask, self._leg, self._servo, seen, wanted)
+        question = (self._leg, self._servo, seen, next(self._wanted))
+        command = answer_of(self.name, self._ask, *question)
         if not is_numbers(command, seen.theta.shape):
             raise ConfigError(
                 f"controller {self.name!r} must command numbers of shape {seen.theta.shape}, "

@@ -153,7 +153,8 @@ class _Loop:
     def _commands(self, latest: Latest | None) -> Array:
         """Return the commands of the next control period, (nsim, n, nu)."""
         k = self._k
-        ctrl = self._ctrl[:, : self._steps - k]
+        left = self._steps - k
+        ctrl = self._ctrl if left >= self._every else self._ctrl[:, :left]
         if self._pushed:
             for row, plan in enumerate(self._plans):
                 ctrl[row, :, :-2] = plan.pushes[k : k + self._every]
