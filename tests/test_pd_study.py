@@ -131,7 +131,8 @@ def test_study_agrees_with_the_equations_of_motion(ran: dict[str, Result]) -> No
     feet = []
     for line in range(2):  # one by one: the reference has a kink at the corner
         time = line + np.linspace(0.0, 1.0, 101)
-        motion = dynamics.integrate(leg, theta, rate, time, torque, rtol=1e-7, atol=1e-8)
+        # its own error is 0.6 um
+        motion = dynamics.integrate(leg, theta, rate, time, torque, rtol=1e-5, atol=1e-6)
         theta = motion.theta[-1]
         rate = motion.theta_dot[-1]
         feet.append(kinematics.forward(leg, motion.theta[1:]))
