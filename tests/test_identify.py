@@ -181,6 +181,18 @@ def plain(J: Array, values: Array | None = None) -> Fit:
     return Fit(chosen, start if values is None else values, spread, J, [0.0], [0.0], 1)
 
 
+def test_a_number_that_nothing_depends_on_is_not_exact() -> None:
+    """As kt is, of a log without currents: its interval was +- 0."""
+    J = np.random.default_rng(1).standard_normal((400, 2)) * np.array([1.0, 0.0])
+    found = plain(J)
+    assert np.isfinite(found.half_widths[0])
+    assert found.half_widths[1] == np.inf
+    np.testing.assert_array_equal(found.correlations, np.eye(2))
+    assert findings.remarks(found) == ["", "not identified"]
+    assert findings.correlated(found) == []
+    assert findings.inflation(found) < 2.0
+
+
 def test_what_cannot_be_told_apart_is_said() -> None:
     """Two links whose derivatives differ in their sign alone: their sum is not told."""
     first = np.random.default_rng(3).standard_normal((400, 1))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+import numpy as np
 from rich.table import Table
 
 from fivebar_sim import units
@@ -81,6 +82,9 @@ def _advice(found: Fit, best: Suggestion) -> str:
     ratio = best.half_widths / doubt
     worst = int(ratio.argmax())
     key = found.parameters[worst]
+
+    if not np.isfinite(ratio[worst]):
+        return f"none of the motions that were tried tells {key.key}"
     if ratio[worst] >= (found.half_widths / doubt).max() and not findings.untold(found):
         return "none of the motions that were tried would tell more"
     return (
@@ -102,7 +106,7 @@ def print_json(told: Told) -> None:
             each.key: {
                 "before": each.start,
                 "value": float(value),
-                "half_width": float(half),
+                "half_width": _number(half),
                 "unit": each.unit,
                 "remark": word,
             }
@@ -113,8 +117,17 @@ def print_json(told: Told) -> None:
         "rms": {"before": found.rms_before, "after": found.rms},
         "held_out": {name: {"before": b, "after": a} for name, (b, a) in told.held_out.items()},
         "motions": [
-            {"name": each.name, "swing": each.swing, "half_widths": each.half_widths.tolist()}
+            {
+                "name": each.name,
+                "swing": each.swing,
+                "half_widths": [_number(half) for half in each.half_widths],
+            }
             for each in told.better
         ],
     }
     print(json.dumps(said, indent=2, allow_nan=False))  # noqa: T201
+
+
+def _number(value: float) -> float | None:
+    """Return a number as JSON has it: None of an interval without end."""
+    return float(value) if np.isfinite(value) else None

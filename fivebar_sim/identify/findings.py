@@ -8,7 +8,7 @@ import numpy as np
 
 from fivebar_sim.arrays import Array
 from fivebar_sim.identify.fit import Fit
-from fivebar_sim.identify.intervals import NORMAL
+from fivebar_sim.identify.intervals import NORMAL, unmoved
 from fivebar_sim.identify.parameters import Parameter
 
 CORRELATED = 0.9
@@ -62,10 +62,14 @@ def untold(fit: Fit) -> list[Combination]:
 
 def inflation(fit: Fit) -> float:
     """Return by how much intervals are wider than of known white residuals, the median."""
+    known = ~unmoved(fit.jacobian)
+    if not known.any():
+        return 1.0
+
     doubt = np.array([each.doubt for each in fit.parameters])
     white = np.linalg.pinv(fit.jacobian.T @ fit.jacobian, rcond=1e-14, hermitian=True)
     plain = np.sqrt(np.maximum(np.diag(white), 1e-300)) * doubt
-    return float(np.median(fit.half_widths / (NORMAL * plain)))
+    return float(np.median((fit.half_widths / (NORMAL * plain))[known]))
 
 
 def remarks(fit: Fit) -> list[str]:

@@ -53,11 +53,14 @@ class Fit(NamedTuple):
 
     @property
     def correlations(self) -> Array:
-        """Correlation of each two numbers, (p, p)."""
+        """Correlation of each two numbers, (p, p); 0 where one is exact, or nothing tells it."""
         covariance = self.spread.covariance
         sd = np.sqrt(np.diag(covariance))
-        # What no residual tells at all has no spread either.
-        return covariance / np.maximum(np.outer(sd, sd), 1e-300)
+        known = np.flatnonzero(np.isfinite(sd) & (sd > 0.0))
+        pairs = np.ix_(known, known)
+        found = np.eye(len(sd))
+        found[pairs] = covariance[pairs] / np.outer(sd[known], sd[known])
+        return found
 
 
 class _Problem:

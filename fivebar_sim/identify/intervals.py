@@ -24,7 +24,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fivebar_sim.arrays import Array
+from fivebar_sim.arrays import Array, Bools
 
 NORMAL = 1.96
 """Half-width of a 95 % interval in standard deviations that are known."""
@@ -40,7 +40,8 @@ class Spread(NamedTuple):
     """How far from the truth a fit's numbers may be.
 
     Attributes:
-        covariance: Of the numbers, in their units squared, (p, p).
+        covariance: Of the numbers, in their units squared, (p, p); infinite of one that
+            no residual depends on.
         sure: Half of each 95 % interval, in standard deviations, (p,).
     """
 
@@ -84,7 +85,17 @@ def newey_west(J: Array, r: Array, lengths: Sequence[int]) -> Spread:
     white = free * float(r @ r) / len(r) * np.diag(inverse)
     # Of residuals that are white after all the estimate scatters: it must not be the surer one.
     wider = np.sqrt(np.maximum(white / own, 1.0))
-    return Spread(lasting * np.outer(wider, wider), quantile(b))
+    covariance = lasting * np.outer(wider, wider)
+
+    # The inverse knows nothing of what nothing depends on, and would call it exact.
+    dead = np.flatnonzero(unmoved(J))
+    covariance[dead, dead] = np.inf
+    return Spread(covariance, quantile(b))
+
+
+def unmoved(J: Array) -> Bools:
+    """Return which numbers no residual depends on, (p,); J are the derivatives, (m, p)."""
+    return np.asarray(~J.any(axis=0))
 
 
 def _middle(g: Array, window: int) -> Array:

@@ -12,7 +12,7 @@ from fivebar_sim.errors import FiveBarError
 from fivebar_sim.geometry import FiveBar
 from fivebar_sim.identify.findings import inflation
 from fivebar_sim.identify.fit import STEP, Fit
-from fivebar_sim.identify.intervals import NORMAL
+from fivebar_sim.identify.intervals import NORMAL, unmoved
 from fivebar_sim.identify.measured import Measured
 from fivebar_sim.identify.parameters import put
 from fivebar_sim.identify.predict import predict
@@ -86,7 +86,8 @@ def suggest(scenario: Scenario, fit: Fit, log: Measured, nthread: int = 0) -> li
     for i, (name, swing, motion) in enumerate(tried):
         first, *others = [each[i].theta[motion.used].ravel() for each in said]
         J = np.stack([(other - first) / STEP for other in others], axis=1) / noise
-        half = NORMAL * wider * np.sqrt(np.diag(np.linalg.pinv(J.T @ J, rcond=1e-14))) * doubt
+        variance = np.diag(np.linalg.pinv(J.T @ J, rcond=1e-14))
+        half = NORMAL * wider * np.sqrt(np.where(unmoved(J), np.inf, variance)) * doubt
         found.append(Suggestion(name, swing, motion.time, motion.ctrl, half))
     return sorted(found, key=lambda each: float((each.half_widths / doubt).max()))
 

@@ -61,6 +61,7 @@ def page(runs: Sequence[StoredRun], drawn: list[Drawn]) -> str:
             f" The metrics of {', '.join(anew)} are computed anew from the record: metrics.json is "
             "missing there."
         )
+
     parts = [
         f"<header>\n<h1>{text('Comparison of runs')}</h1>\n<p>{text(summary)}</p>\n</header>",
         html.section("What differs in the scenarios", _differences(runs)),

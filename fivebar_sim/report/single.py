@@ -102,6 +102,7 @@ def head(run: StoredRun, about: str, warnings: Sequence[str] = ()) -> str:
     tripped = [f'<p class="fail">{text(said)}</p>' for said in guards.tripped(run.measured.guards)]
     if run.anew:
         warnings = [*warnings, ANEW]
+
     return "\n".join(
         [
             f"<header>\n<h1>{text(run.scenario.name)}</h1>",

@@ -46,6 +46,7 @@ def states(planned: Plan, record: Record, unsolved: Bools) -> States:
     applied = np.zeros_like(v)
     applied[:, MOTORS_FROM_END] = motors(record, "torque")
     applied[:, MOTORS_FROM_END] -= planned.scenario.servo.gear.viscous * v[:, MOTORS_FROM_END]
+
     return of_columns(
         planned.model,
         q=np.concatenate([planned.start[None], q]),
