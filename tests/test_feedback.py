@@ -22,6 +22,7 @@ from fivebar_sim.metrics.columns import digest
 from fivebar_sim.rollout import Plan
 from fivebar_sim.scenario import Scenario
 from fivebar_sim.simulation import feedback
+from fivebar_sim.simulation.steps import Legs
 
 H = 1e-3
 ASIDE = ["duration=0.4", "path.frequency=4", "path.ramp=0.1", "limits={}"]
@@ -167,6 +168,21 @@ def test_many_like_legs_are_one_call_and_keep_their_bits() -> None:
     for i in (0, 16, 32):
         for name, column in rollout.execute(plans[i]).record.items():
             np.testing.assert_array_equal(column, together[i].record[name], name)
+
+
+def test_threads_are_given_only_what_is_worth_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    threads = []
+
+    def legs(models: Any, start: Array, nthread: int) -> Legs:
+        threads.append(nthread)
+        return Legs(models, start, nthread)
+
+    monkeypatch.setattr(feedback, "Legs", legs)
+    few = planned(*BRIEF, "controller.name=pd")
+    seldom = with_mine(Angles(period=0.02), *BRIEF)
+    for plans in ([few] * 15, [few] * 16, [seldom]):
+        rollout.run_all(plans, 2)
+    assert threads == [1, 2, 2]
 
 
 def test_legs_of_several_periods_and_kinds_come_back_in_order() -> None:

@@ -47,7 +47,7 @@ RUNS = {
 def ran() -> dict[str, Result]:
     """Return all runs that hold, of one batch."""
     plans = [rollout.plan(Scenario.load(source, [LONG, *s])) for source, *s in RUNS.values()]
-    return dict(zip(RUNS, rollout.run_all(plans, nthread=0), strict=True))
+    return dict(zip(RUNS, rollout.run_all(plans), strict=True))
 
 
 def rms(result: Result) -> float:

@@ -27,6 +27,10 @@ BLOCK = 256
 SINGLY = 8
 """Steps of a control period up to which it costs less to take them one by one than at once."""
 
+HANDED = 16
+"""Steps, over all legs, that are taken between two commands, from which on more threads pay off: to
+hand them a step takes as long as several steps."""
+
 GLANCE = 0.2
 """Time between two moments at which whoever watches a run in the loop is shown its steps [s]."""
 
@@ -92,8 +96,11 @@ class _Loop:
         self._plans = plans
         self._patience = patience
         start = np.stack([plan.start for plan in plans])
-        self._legs = Legs([plan.model for plan in plans], start, nthread)
         self._every = period_steps(plans[0])
+        once = len(plans) * (1 if self._every <= SINGLY else self._every)
+        threads = nthread if once >= HANDED else 1
+        self._legs = Legs([plan.model for plan in plans], start, threads)
+
         self._steps = plans[0].scenario.steps
         self._ctrl = np.empty((len(plans), self._every, plans[0].model.nu))
         self._pushed = plans[0].pushes.size > 0
