@@ -95,7 +95,7 @@ def imports(source: str) -> list[str]:
 
 def examples_set(source: str) -> set[str]:
     """Return which of Hypothesis's settings a source sets anywhere, in whatever call."""
-    calls = (node for node in ast.walk(ast.parse(source)) if isinstance(node, ast.Call))
+    calls = (node for node in ast.walk(house.parsed(source)) if isinstance(node, ast.Call))
     return {
         str(keyword.arg)
         for call in calls
