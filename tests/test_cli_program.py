@@ -9,7 +9,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from shell import JUDGED, Shell
+from shell import JUDGED, LIGHT, Shell
 
 from fivebar_sim import __version__
 from fivebar_sim.cli import program as fivebar
@@ -30,9 +30,9 @@ def names(folder: Path) -> set[str]:
     return {str(path.relative_to(folder)) for path in folder.rglob("*")}
 
 
-def program(*args: str, **more: str) -> tuple[int, str, str]:
+def program(*args: str) -> tuple[int, str, str]:
     """Return status, stdout and stderr of a command."""
-    done = subprocess.run([FIVEBAR, *args], capture_output=True, text=True, env=os.environ | more)
+    done = subprocess.run([FIVEBAR, *args], capture_output=True, text=True)
     return done.returncode, done.stdout, done.stderr
 
 
@@ -47,9 +47,12 @@ def test_program_runs_and_fails_as_its_function_does(folder: Path) -> None:
 
 def test_output_suits_its_reader(folder: Path) -> None:
     odd = ["run", "short.toml", "--set", "leg.name=é", "--out", "mine"]
-    status, out, err = program(*odd, PYTHONIOENCODING="ascii")  # a whole run
-    assert (status, err) == (0, "")
-    assert "short: \\xe9 leg" in out
+    code = LIGHT + "from fivebar_sim.cli import main\nsys.exit(main())"  # a whole run
+    ascii_only = os.environ | {"PYTHONIOENCODING": "ascii"}
+    command = [sys.executable, "-c", code, *odd]
+    done = subprocess.run(command, capture_output=True, text=True, env=ascii_only)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "short: \\xe9 leg" in done.stdout
     for command in (["list"], ["check", "short.toml"]):
         with subprocess.Popen(
             [FIVEBAR, *command], stdout=subprocess.PIPE, stderr=subprocess.PIPE

@@ -50,7 +50,8 @@ sys.exit(status)
 """
 """The program, that says when signals are heard, and when no more."""
 ENDS = [(signal.SIGINT, 130, "fivebar: interrupted\n"), (signal.SIGTERM, 143, "")]
-LONG = ["run", "short.toml", "--quiet", "--set", "duration=300", "--out", "mine"]
+# It takes a second to simulate, and half of one to plan, as the tests wait for.
+LONG = ["run", "short.toml", "--quiet", "--set", "duration=60", "--out", "mine"]
 
 
 @pytest.fixture(autouse=True)
