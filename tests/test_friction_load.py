@@ -202,11 +202,6 @@ def test_refusal(sets: list[str], message: str) -> None:
         Scenario.load("payload-ellipse", [*LOADED, *sets])
 
 
-def test_refusal_of_a_robot_with_gears_that_change() -> None:
-    with pytest.raises(ConfigError, match=r"servo\.friction of a robot must be a number"):
-        Scenario.load("robot-q8bot-trot", ["robot.servo.preset=xl330-m288"])
-
-
 def test_a_written_scenario_keeps_its_friction() -> None:
     scenario = Scenario.load("payload-ellipse", [*LOADED, "servo.friction.base=0.01"])
     again = Scenario.from_table(scenario.table(), "again", Path())

@@ -30,6 +30,7 @@ class Bars(NamedTuple):
     Attributes:
         L1, L2, L3, L4: Lengths [m].
         along, across: Where the foot is on L2, from B [m].
+        base: Of A along x of the hip frame [m].
         height: Of A above the hip frame's origin [m].
         foot_radius: Of the foot's ball [m].
     """
@@ -40,8 +41,21 @@ class Bars(NamedTuple):
     L4: float | Array
     along: float | Array
     across: float | Array
+    base: float | Array
     height: float | Array
     foot_radius: float | Array
+
+
+class Foot(NamedTuple):
+    """What the ground does to a foot, along the hip frame's x and z.
+
+    Attributes:
+        force: Of the ground [N], (..., 2).
+        arm: From the ball's middle to where it acts [m], (..., 2).
+    """
+
+    force: Array
+    arm: Array
 
 
 class Through(NamedTuple):
@@ -58,19 +72,18 @@ class Through(NamedTuple):
 
 def bars(leg: FiveBar) -> Bars:
     """Return what of a leg places its joints."""
-    height = kinematics.bases(leg)[0][1]
-    return Bars(leg.L1, leg.L2, leg.L3, leg.L4, *leg.foot_offset, height, leg.foot_radius)
+    x, z = kinematics.bases(leg)[0]
+    return Bars(leg.L1, leg.L2, leg.L3, leg.L4, *leg.foot_offset, x, z, leg.foot_radius)
 
 
-def through(bars: Bars, q: Array, constraint: Array, ground: Array, hip: Array) -> Through:
+def through(bars: Bars, q: Array, constraint: Array, foot: Foot | None) -> Through:
     """Return the constraint forces at A and E, told apart.
 
     Args:
         bars: The legs.
         q: (theta_A, theta_B, theta_E, theta_D) before the step [rad], (..., 4).
         constraint: Joint forces of all constraints in the step [N m], (..., 4).
-        ground: Force (x, z) of the ground on the foot [N], (..., 2); (..., 0) without one.
-        hip: Height of the hip frame above the ground [m], (...).
+        foot: What the ground does to the foot; None without a ground.
     """
     L1 = _along(bars.L1, q[..., 0])
     BC = _along(bars.L2, q[..., 0] + q[..., 1])
@@ -80,9 +93,10 @@ def through(bars: Bars, q: Array, constraint: Array, ground: Array, hip: Array) 
 
     g: Pair = (np.zeros_like(k_A), np.zeros_like(k_A))
     at_B = k_B
-    if ground.shape[-1]:
-        g = (ground[..., 0], ground[..., 1])
-        at_B = k_B - _cross(_contact(bars, q, hip, L1), g)
+    if foot is not None:
+        g = (foot.force[..., 0], foot.force[..., 1])
+        x, z = _ball(bars, q)
+        at_B = k_B - _cross((x + foot.arm[..., 0], z + foot.arm[..., 1]), g)
 
     # A leg that has come to lie in line has lost its branch: its loop's force is not known.
     det = BC[0] * DC[1] - BC[1] * DC[0]
@@ -97,15 +111,43 @@ def through(bars: Bars, q: Array, constraint: Array, ground: Array, hip: Array) 
     return Through(gear, np.stack([outer_A, outer_E], axis=-1))
 
 
-def _contact(bars: Bars, q: Array, hip: Array, L1: Pair) -> Pair:
-    """Return where the foot touches, from B [m]: MuJoCo has it in the middle of the overlap."""
+def standing(bars: Bars, q: Array, force: Array, hip: Array) -> Foot | None:
+    """Return what level ground does to the foot of a leg that hangs upright.
+
+    Args:
+        bars: The legs.
+        q: As in `through`.
+        force: Force (x, z) of the ground on the foot [N], (..., 2); (..., 0) without one.
+        hip: Height of the hip frame above the ground [m], (...).
+    """
+    if not force.shape[-1]:
+        return None
+    z = _ball(bars, q)[1]
+    L1 = _along(bars.L1, q[..., 0])
+    lowest = hip + bars.height + L1[1] + z - bars.foot_radius
+    # MuJoCo has the contact in the middle of the overlap.
+    down = bars.foot_radius + 0.5 * np.minimum(lowest, 0.0)
+    return Foot(force, np.stack([np.zeros_like(down), -down], axis=-1))
+
+
+def foot_place(bars: Bars, q: Array) -> Array:
+    """Return the middle of the foot's ball in the hip frame [m], (..., 2).
+
+    Args:
+        bars: The legs.
+        q: As in `through`.
+    """
+    L1 = _along(bars.L1, q[..., 0])
+    x, z = _ball(bars, q)
+    return np.stack([bars.base + L1[0] + x, bars.height + L1[1] + z], axis=-1)
+
+
+def _ball(bars: Bars, q: Array) -> Pair:
+    """Return the middle of the foot's ball, from B [m]."""
     psi = q[..., 0] + q[..., 1]
     c = np.cos(psi)
     s = np.sin(psi)
-    x = bars.along * c - bars.across * s
-    z = bars.along * s + bars.across * c
-    lowest = hip + bars.height + L1[1] + z - bars.foot_radius
-    return x, z - (bars.foot_radius + 0.5 * np.minimum(lowest, 0.0))
+    return bars.along * c - bars.across * s, bars.along * s + bars.across * c
 
 
 def _along(length: float | Array, psi: Array) -> Pair:

@@ -58,6 +58,7 @@ def _mistakes() -> Iterator[tuple[str, Callable[[Array, Array], Array]]]:
         "commands in radians read as degrees, a factor of 57.3: unit = 'rad' for both",
         lambda u, _: np.degrees(u),
     )
+
     yield "commands that count clockwise: sign = -1 for both", lambda u, _: -u
     yield (
         "commands with other zeros than the angles: the same offset for both",

@@ -100,6 +100,7 @@ def check_follows(interval: float, where: str) -> None:
     """
     if interval <= SLOWEST:
         return
+
     guess = ""
     for unit, scale in (("ms", 1e-3), ("us", 1e-6), ("ns", 1e-9)):
         if scale * interval <= SLOWEST:

@@ -25,8 +25,16 @@ def rub(spec: mujoco.MjSpec, servo: Servo) -> None:
         joint.solref_friction = (2.0 * spec.option.timestep, 1.0)
         joint.solimp_friction[:3] = (0.9999, 0.9999, 0.001)
 
+    tell_law(spec, servo)
+
+
+def tell_law(spec: mujoco.MjSpec, servo: Servo) -> None:
+    """Give a model the numbers of a friction that changes, if it does.
+
+    Whoever steps the model sets the largest friction of every step by them. A robot's model needs
+    them too: of the legs that are attached to it only what moves comes along.
+    """
     if servo.gear.changes:
-        # Whoever steps the model sets the largest friction of every step by these numbers.
         law = [getattr(servo.gear, name) for name in NUMBERS]
         spec.add_numeric(name=FRICTION_LAW, data=law, size=len(law))
 

@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 
 from fivebar_sim.arrays import Array
 from fivebar_sim.control.friction import Friction, FrictionArrays
-from fivebar_sim.dynamics.gears import Bars, Through, through
-from fivebar_sim.metrics.columns import MOTORS_FROM_END
+from fivebar_sim.dynamics.gears import Bars, Foot, Through, standing, through
+from fivebar_sim.model.feet import POSE, Hips, walking
 from fivebar_sim.model.friction import friction_law
 
 RECORDED = ("qfrc_constraint", "qfrc_bias", "qfrc_actuator", "actuator_force")
@@ -48,14 +48,16 @@ class Step(NamedTuple):
 
 
 class Gears:
-    """The gears of legs, and what passed through them in the last step.
+    """The gears of n legs or robots, k legs each, and what passed through them in the last step.
 
     Args:
-        models: Each leg's model.
-        ground: Where sensordata has the ground's force (x, z); empty without a ground.
+        models: Each one's model.
+        ground: Where sensordata has the ground's force, (x, z) of a leg, (x, y, z) of each leg of a
+            robot; empty without a ground.
 
     Attributes:
-        dofs: The two joints in a model's degrees of freedom.
+        dofs: The motors' joints in a model's degrees of freedom, A and E of each leg.
+        memory: Torques of the motors, and those from outside, in the last step [N m], (n, 2, 2 k).
     """
 
     def __init__(self, models: Sequence[mujoco.MjModel], ground: Sequence[int]) -> None:
@@ -66,11 +68,19 @@ class Gears:
         )
         # A gear without friction of its own must stay without, so that its leg keeps its bits.
         self._least = np.array([[0.0 if law is None else LEAST] for law in laws])
+
+        fronts = fronts_of(first)
+        self._legs = len(fronts)
         self._bars = bars_of(models)
         self._motors = _Motors.of(models)
         self._ground = list(ground)
-        self.dofs = [int(first.joint(name).dofadr[0]) for name in "AE"]
-        self.memory = np.zeros((len(models), 2, 2))
+        self._hips = Hips.of(models, fronts) if fronts[0] else None
+
+        self._joints = slice(-4 * self._legs, None)
+        self._turning = slice(-4 * self._legs, None, 2)
+        self._own = slice(-2 * self._legs, None)
+        self.dofs = dofs_of(first)
+        self.memory = np.zeros((len(models), 2, 2 * self._legs))
 
     @classmethod
     def of(cls, models: Sequence[mujoco.MjModel], ground: Sequence[int]) -> Gears | None:
@@ -86,7 +96,7 @@ class Gears:
         self.memory[rows] = 0.0
 
     def largest(self, v: Array) -> Array:
-        """Return how much the gears resist at most in the next step [N m], (n, 2).
+        """Return how much the gears resist at most in the next step [N m], (n, 2 k).
 
         Args:
             v: qvel before it, (n, nv).
@@ -95,7 +105,7 @@ class Gears:
         outer = self.memory[:, 1]
         # What broke down is found later; here it must only not become another error.
         with np.errstate(all="ignore"):
-            found = self._law.largest(torque, outer, v[:, MOTORS_FROM_END])
+            found = self._law.largest(torque, outer, v[:, self._turning])
         return np.maximum(np.nan_to_num(found, posinf=LEAST), self._least)
 
     def took(self, step: Step) -> None:
@@ -104,16 +114,42 @@ class Gears:
             self.memory = np.stack([self._motors.torque(step), self._outer(step)], axis=1)
 
     def _outer(self, step: Step) -> Array:
-        """Return the torque from outside at each motor's joint [N m], (n, 2).
+        """Return the torque from outside at each motor's joint [N m], (n, 2 k).
 
         Weight, centripetal torques, and all that constraints and pushes do but the gear itself.
         """
-        ground = step.found["sensordata"][:, self._ground] if self._ground else step.q[:, :0]
-        hip = step.q[:, 0] if step.q.shape[1] > 4 else np.zeros(len(step.q))
-        constraint = step.found["qfrc_constraint"][:, -4:]
-        parts: Through = through(self._bars, step.q[:, -4:], constraint, ground, hip)
-        pushed = step.found["qfrc_actuator"][:, self.dofs] - step.found["actuator_force"][:, -2:]
-        return parts.outer + pushed - step.found["qfrc_bias"][:, self.dofs]
+        q = step.q[:, self._joints].reshape(-1, 4)
+        constraint = step.found["qfrc_constraint"][:, self._joints].reshape(-1, 4)
+        parts: Through = through(self._bars, q, constraint, self._feet(step, q))
+        pushed = (
+            step.found["qfrc_actuator"][:, self.dofs] - step.found["actuator_force"][:, self._own]
+        )
+        outer = parts.outer.reshape(len(step.q), -1)
+        return outer + pushed - step.found["qfrc_bias"][:, self.dofs]
+
+    def _feet(self, step: Step, q: Array) -> Foot | None:
+        """Return what the ground does to the feet; None without a ground."""
+        force = step.found["sensordata"][:, self._ground]
+        if self._hips is None:
+            hip = step.q[:, 0] if step.q.shape[1] > 4 else np.zeros(len(step.q))
+            return standing(self._bars, q, force, hip)
+        # A trunk that is held has no place in qpos, and its feet no floor.
+        if step.q.shape[1] < POSE + 4 * self._legs:
+            return None
+        shape = (len(q) // self._legs, self._legs)
+        pose = step.q[:, :POSE]
+        return walking(self._bars, self._hips, q.reshape(*shape, 4), pose, force.reshape(*shape, 3))
+
+
+def fronts_of(model: mujoco.MjModel) -> tuple[str, ...]:
+    """Return what the names of each leg of a model begin with; "" of a leg alone."""
+    names = [model.joint(i).name for i in range(model.njnt)]
+    return tuple(name.removesuffix("A") for name in names if name == "A" or name.endswith("_A"))
+
+
+def dofs_of(model: mujoco.MjModel) -> list[int]:
+    """Return the motors' degrees of freedom, A and E of each leg."""
+    return [int(model.joint(f"{front}{m}").dofadr[0]) for front in fronts_of(model) for m in "AE"]
 
 
 def _numbers(model: mujoco.MjModel) -> Array:
@@ -126,7 +162,7 @@ def _numbers(model: mujoco.MjModel) -> Array:
 
 
 class _Motors(NamedTuple):
-    """The laws of motors as their models have them, (n, 2) each.
+    """The laws of motors as their models have them, (n, 2 k) each.
 
     Attributes:
         gain, bias, rate: Of the command, the angle and the rate, within the limit.
@@ -144,8 +180,8 @@ class _Motors(NamedTuple):
 
     @classmethod
     def of(cls, models: Sequence[mujoco.MjModel]) -> _Motors:
-        own = slice(-2, None)
-        dofs = [int(models[0].joint(name).dofadr[0]) for name in "AE"]
+        dofs = dofs_of(models[0])
+        own = slice(-len(dofs), None)
         numbers = FrictionArrays.named(np.array([_numbers(model) for model in models]).T).numbers
         ends = [
             np.where(model.actuator_forcelimited[own], model.actuator_forcerange[own, 1], np.inf)
@@ -164,27 +200,33 @@ class _Motors(NamedTuple):
 
     def torque(self, step: Step) -> Array:
         """Return what each motor applied in a step [N m], as `control.servo.applied_torque`."""
-        q = np.where(self.late, step.q_next[:, MOTORS_FROM_END], step.q[:, MOTORS_FROM_END])
-        v = step.v_next[:, MOTORS_FROM_END]
-        asked = self.gain * step.ctrl[:, -2:] + self.bias * q + self.rate * v
+        count = self.gain.shape[1]
+        turning = slice(-2 * count, None, 2)
+        q = np.where(self.late, step.q_next[:, turning], step.q[:, turning])
+        v = step.v_next[:, turning]
+        asked = self.gain * step.ctrl[:, -count:] + self.bias * q + self.rate * v
         return np.clip(asked, -self.limit, self.limit) - self.back_emf * v
 
 
 def bars_of(models: Sequence[mujoco.MjModel]) -> Bars:
-    """Return what places the joints of some models, (n,) each."""
+    """Return what places the joints of all legs of some models, (n k,) each."""
+    # The legs of a robot are alike.
+    fronts = fronts_of(models[0])
+    first = fronts[0]
 
     def column(read: Any) -> Array:
-        return np.array([float(read(model)) for model in models])
+        return np.repeat(np.array([float(read(model)) for model in models]), len(fronts))
 
     return Bars(
-        L1=column(lambda m: m.body("L2").pos[0]),
-        L2=column(lambda m: m.site("C_left").pos[0]),
-        L3=column(lambda m: m.site("C_right").pos[0]),
-        L4=column(lambda m: m.body("L3").pos[0]),
-        along=column(lambda m: m.site("foot").pos[0]),
-        across=column(lambda m: m.site("foot").pos[2]),
-        height=column(lambda m: m.body("L1").pos[2]),
-        foot_radius=column(lambda m: m.geom("foot").size[0]),
+        L1=column(lambda m: m.body(f"{first}L2").pos[0]),
+        L2=column(lambda m: m.site(f"{first}C_left").pos[0]),
+        L3=column(lambda m: m.site(f"{first}C_right").pos[0]),
+        L4=column(lambda m: m.body(f"{first}L3").pos[0]),
+        along=column(lambda m: m.site(f"{first}foot").pos[0]),
+        across=column(lambda m: m.site(f"{first}foot").pos[2]),
+        base=column(lambda m: m.body(f"{first}L1").pos[0]),
+        height=column(lambda m: m.body(f"{first}L1").pos[2]),
+        foot_radius=column(lambda m: m.geom(f"{first}foot").size[0]),
     )
 
 

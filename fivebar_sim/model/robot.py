@@ -17,6 +17,7 @@ from fivebar_sim.errors import ArgumentError, GeometryError
 from fivebar_sim.files import resources
 from fivebar_sim.integrator import Integrator
 from fivebar_sim.model.file import quiet, read
+from fivebar_sim.model.friction import tell_law
 from fivebar_sim.model.ground import lay
 from fivebar_sim.model.leg import HIP_HEIGHT, leg_spec, set_options, standing
 from fivebar_sim.robots import LEGS, Air, Floor, Hip, Robot, Scene
@@ -121,6 +122,7 @@ def robot_spec(
             )
             _attach(spec, leg, robot, name, scene)
 
+        tell_law(spec, robot.servo)
         _place(spec, robot, scene, q)
         _rest(spec, robot, scene, q, drive, len(pushes))
     return spec

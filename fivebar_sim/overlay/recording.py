@@ -70,6 +70,7 @@ def write(found: Compared, place: Path) -> None:
     legs = (_run(found), _log(found))
     plots = {look: list(_plots(found, look)) for look in (RUN, LOG)}
     room = room_of([found.scenario.leg] * 2, [each.motion for each in legs])
+
     with rrd.file_of(place, [found.scenario.name, Path(found.log.where).name]) as stream:
         views = layout.contents(room, [RUN, LOG], list(plots.values()))
         layout.send(stream, views)

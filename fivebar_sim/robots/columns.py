@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from fivebar_sim.arrays import Array
-from fivebar_sim.metrics.columns import COLUMNS, Record, side_by_side
+from fivebar_sim.metrics.columns import COLUMNS, FRICTION_COLUMNS, Record, side_by_side
 from fivebar_sim.robots.floor import Floor, Scene
 from fivebar_sim.robots.measure import Trunk
 from fivebar_sim.robots.places import SWING, SWING_RATE
@@ -34,16 +34,21 @@ SIDE_COLUMNS = (SWING, SWING_RATE, "ctrl_S", "torque_S")
 """Of the motor S of a leg that has one: angle, rate, command [rad] and torque [N m]."""
 
 
-def columns(scene: Scene, *, side_step: bool = False) -> list[str]:
+def columns(scene: Scene, *, side_step: bool = False, rubbed: bool = False) -> list[str]:
     """Return the columns of a robot's record in a scene, in their order.
 
     Args:
         scene: What it stands on.
         side_step: Whether its legs have a motor S.
+        rubbed: Whether they say what the gears take, see `Servo.records_friction`.
     """
     free = isinstance(scene, Floor)
-    sides = SIDE_COLUMNS if side_step else ()
-    own = [*COLUMNS[1:], *sides, *(FORCE_COLUMNS if free else ())]
+    own = [
+        *COLUMNS[1:],
+        *(FRICTION_COLUMNS if rubbed else ()),
+        *(SIDE_COLUMNS if side_step else ()),
+        *(FORCE_COLUMNS if free else ()),
+    ]
     legs = [f"{leg}_{name}" for leg in LEGS for name in own]
     return ["time", *(TRUNK_COLUMNS if free else ()), *legs]
 

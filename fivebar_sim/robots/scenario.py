@@ -259,6 +259,22 @@ def _check_pushes(scenario: RobotScenario, *, held: bool) -> None:
             raise ConfigError(f"limits.{key} needs a [[push]]: nothing pushes the robot")
 
 
+def _check_friction(scenario: RobotScenario) -> None:
+    """Raise where what passes through the gears is not known: off level floors, beside motors S."""
+    if not scenario.servo.records_friction:
+        return
+    where = ""
+    if scenario.robot.side_step is not None:
+        where = "with hips.side_step"
+    elif isinstance(scenario.scene, Floor) and not scenario.scene.ground.level:
+        where = "on uneven ground"
+    if where:
+        raise ConfigError(
+            f"servo.friction of a robot {where} must be a number [N m]: how friction changes with "
+            "speed and load is known of legs without a motor S, in the air or on a flat floor"
+        )
+
+
 def _check_together(scenario: RobotScenario) -> None:
     """Raise unless the tables of a scenario, each legal by itself, fit together."""
     try:
@@ -269,11 +285,7 @@ def _check_together(scenario: RobotScenario) -> None:
     if any((scenario.sideways or TOGETHER).values()) and scenario.robot.side_step is None:
         raise ConfigError("gait.sideways needs a robot with hips.side_step: its legs have no S")
     check_window(scenario)
-    if scenario.servo.records_friction:
-        raise ConfigError(
-            "servo.friction of a robot must be a number [N m]: friction that changes "
-            "with speed and load is known of single legs only"
-        )
+    _check_friction(scenario)
     held = isinstance(scenario.scene, Air)
     _check_pushes(scenario, held=held)
     for key in scenario.limits:

@@ -168,7 +168,8 @@ def _common_columns(scenario: Scenario) -> list[str]:
     """Return the columns that every record of a leg has, or all of a robot's."""
     if isinstance(scenario, RobotScenario):
         sided = scenario.robot.side_step is not None
-        return robots_columns(scenario.scene, side_step=sided)
+        rubbed = scenario.servo.records_friction
+        return robots_columns(scenario.scene, side_step=sided, rubbed=rubbed)
     return list(COLUMNS)
 
 

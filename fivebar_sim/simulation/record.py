@@ -43,11 +43,14 @@ class Part(NamedTuple):
         states: The states after each of them.
         begin: Index of the first.
         before: qpos before it, (nq,).
+        foot: What the floor does to the foot of a robot's leg; None of a leg alone, whose ground
+            `states` have.
     """
 
     states: States
     begin: int
     before: Array
+    foot: gears.Foot | None = None
 
 
 def points(planned: Plan, part: Part) -> kinematics.Points:
@@ -98,10 +101,12 @@ def _rubbed(planned: Plan, part: Part) -> Record:
     states = part.states
     before = np.concatenate([part.before[None], states.qpos[0, :-1]])
     hip = before[:, 0] if before.shape[1] > len(JOINTS) else np.zeros(len(before))
+
     bars = gears.bars(planned.scenario.leg)
-    found = gears.through(
-        bars, before[:, -4:], states.constraint[0, :, -4:], states.ground[0], hip
-    ).gear
+    foot = part.foot
+    if isinstance(planned.scenario.scene, Ground):
+        foot = gears.standing(bars, before[:, -4:], states.ground[0], hip)
+    found = gears.through(bars, before[:, -4:], states.constraint[0, :, -4:], foot).gear
     viscous = planned.scenario.servo.gear.viscous * states.qvel[0, :, MOTORS_FROM_END]
     return dict(zip(FRICTION_COLUMNS, (found - viscous).T, strict=True))
 

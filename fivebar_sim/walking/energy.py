@@ -33,13 +33,17 @@ def balance(went: Walk) -> Balance:
     kinetic, potential = meter.energies()
     ground = meter.ground(w) if isinstance(planned.scene, Floor) else np.zeros(len(v))
     torque = np.concatenate([motors(of_leg(went.record, leg), "torque") for leg in LEGS], axis=1)
-    turning = w[:, _motors(planned.model)]
+    own = _motors(planned.model)
+    turning = w[:, own]
     motor = np.sum(torque * turning, axis=1)
     if planned.robot.side_step is not None:
         sides = [planned.robot.joints * (k - len(LEGS)) for k in range(len(LEGS))]
         swung = np.stack([went.record[f"{leg}_torque_S"] for leg in LEGS], axis=1)
         motor += np.sum(swung * w[:, sides], axis=1)
-    constraint = went.states.constraint[0]
+
+    # MuJoCo counts the gears' viscous friction as damping, which a motor has too.
+    constraint = went.states.constraint[0].copy()
+    constraint[:, own] -= planned.robot.servo.gear.viscous * v[:, own]
 
     start = planned.start
     moved = np.abs(went.states.qpos[0] - start).max() > STILL

@@ -8,8 +8,10 @@ from typing import NamedTuple
 import numpy as np
 
 from fivebar_sim.arrays import Array, Bools
+from fivebar_sim.dynamics.gears import Foot, bars
 from fivebar_sim.errors import DivergedError
 from fivebar_sim.metrics.columns import Record
+from fivebar_sim.model.feet import POSE, Hips, walking
 from fivebar_sim.robots import LEGS, Floor
 from fivebar_sim.robots.columns import FORCE_COLUMNS, SIDE_COLUMNS, TRUNK_COLUMNS, trunk
 from fivebar_sim.robots.jump import Jump, jump
@@ -191,8 +193,20 @@ def _part(planned: RobotPlan, states: States, k: int) -> Part:
         qpos=states.qpos[..., joints],
         qvel=states.qvel[..., joints],
         ctrl=states.ctrl[..., motors],
+        constraint=states.constraint[..., joints],
     )
-    return Part(own, 0, planned.legs[k].start)
+    return Part(own, 0, planned.legs[k].start, _foot(planned, states, k))
+
+
+def _foot(planned: RobotPlan, states: States, k: int) -> Foot | None:
+    """Return what the floor does to foot k in each step, where the gears' share is told from it."""
+    if not isinstance(planned.scene, Floor) or not planned.robot.servo.records_friction:
+        return None
+    q = before(planned.start, states.qpos[0])
+    joints = q[:, None, POSE + 4 * k : POSE + 4 * k + 4]
+    force = states.ground[0, :, None, 3 * k : 3 * k + 3]
+    hips = Hips.of([planned.model], [f"{LEGS[k]}_"])
+    return walking(bars(planned.robot.leg), hips, joints, q[:, :POSE], force)
 
 
 def before(start: Array, after: Array) -> Array:
