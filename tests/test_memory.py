@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 import tracemalloc
 from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
+import tomli_w
 from shell import Shell
 
 from fivebar_sim import rollout
@@ -15,6 +18,7 @@ from fivebar_sim.cli import common
 from fivebar_sim.metrics.columns import COLUMNS
 from fivebar_sim.recording import rrd
 from fivebar_sim.recording.plots import Series
+from fivebar_sim.runs import coarse
 from fivebar_sim.scenario import Scenario
 from fivebar_sim.simulation.plan import Plan
 
@@ -82,3 +86,41 @@ def test_verdicts_do_not_depend_on_how_many_runs_fit(
     steps = Scenario.load("short.toml").steps
     fit = max(1, min(3, most // steps))
     assert calls == [fit] * (3 // fit) + [3 % fit] * bool(3 % fit)
+
+
+def _written(count: int, steps: int) -> list[str]:
+    """Write scenarios of so many steps; return their files' names."""
+    scenario = planned(steps).scenario
+    names = [f"run-{k}.toml" for k in range(count)]
+    for name in names:
+        own = {**scenario.table(), "name": name[:-5], "limits": {"tracking.rms": 1.0}}
+        Path(name).write_text(tomli_w.dumps(own), encoding="utf-8")
+    return names
+
+
+def test_a_check_of_many_long_runs_has_one_of_them_at_a_time(
+    shell: Shell, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What is left of each run is its verdict: four of them take what two take."""
+    steps = 6_000
+    monkeypatch.setattr(common, "TOGETHER", steps)
+    # The runs in shorter steps are those of one scenario, and gone before the next.
+    monkeypatch.setattr(coarse, "warnings", lambda *given: [])
+    names = _written(4, steps)
+    assert shell("check", *names[:1]).status == 0
+    two, four = (peak(lambda n=n: shell("check", *names[:n])) for n in (2, 4))
+    assert four - two < RECORD * steps
+
+
+@pytest.mark.long
+def test_a_check_of_twenty_runs_of_a_million_steps_takes_less_than_a_gigabyte(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    import resource
+
+    monkeypatch.chdir(tmp_path)
+    names = _written(20, 1_000_000)
+    command = [sys.executable, "-m", "fivebar_sim", "check", "--quiet", *names]
+    subprocess.run(command, check=True, timeout=3600.0)
+    # Of the largest child so far [kB].
+    assert resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss < 1e6
