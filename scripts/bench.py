@@ -27,8 +27,11 @@ import numpy as np
 
 from fivebar_sim import rollout, tasks
 from fivebar_sim.arrays import Array
+from fivebar_sim.robots.scenario import RobotScenario
 from fivebar_sim.scenario import Scenario
-from fivebar_sim.simulation.steps import Legs
+from fivebar_sim.simulation.steps import Legs, simulate
+from fivebar_sim.walking.plan import plan_scenario
+from fivebar_sim.walking.walk import walk
 
 Steps = Callable[[], int]
 """Takes some steps, and returns how many."""
@@ -72,7 +75,7 @@ def built(folder: Path) -> ctypes.CDLL | None:
     return loop
 
 
-def looped(loop: ctypes.CDLL | None, planned: rollout.Plan, ctrl: Array) -> Steps:
+def looped(loop: ctypes.CDLL | None, planned: rollout.AnyPlan, ctrl: Array) -> Steps:
     """Return what takes a plan's steps and nothing else."""
     model = planned.model
     table = np.ascontiguousarray(ctrl)
@@ -114,6 +117,30 @@ def runs(loop: ctypes.CDLL | None, name: str, seconds: float, folder: Path) -> I
     yield Row(f"physics, {name}", 1.15, name == "classic-ellipse", physics, plain)
     yield Row(f"record and verdict, {name}", 0.9, False, execute, plain)
     yield Row(f"run with all files, {name}", 0.55, False, whole, plain)
+
+
+def robot(loop: ctypes.CDLL | None, name: str, settings: list[str]) -> Iterator[Row]:
+    """Yield a robot's steps, all recorded; the record's columns and falls; and its verdict."""
+    scenario = Scenario.load(name, settings)
+    assert isinstance(scenario, RobotScenario)
+    planned = plan_scenario(scenario)
+    assert planned.setpoints is not None
+    ctrl = np.concatenate([planned.besides, planned.setpoints], axis=1)
+    plain = looped(loop, planned, ctrl)
+
+    def physics() -> int:
+        return simulate(planned.model, planned.start[None], ctrl[None]).time.shape[1]
+
+    def recorded() -> int:
+        return len(walk(planned).record["time"])
+
+    def execute() -> int:
+        return rollout.execute(planned).scenario.steps
+
+    of = f"{name} {' '.join(settings[1:])}".strip()
+    yield Row(f"robot's steps, {of}", 0.9, False, physics, plain)
+    yield Row(f"and its record, {of}", 0.9, False, recorded, plain)
+    yield Row(f"and its verdict, {of}", 0.9, False, execute, plain)
 
 
 def asked(loop: ctypes.CDLL | None, legs: int, seconds: float, goal: float) -> Row:
@@ -178,6 +205,8 @@ def main() -> int:
         rows = [
             *runs(loop, "classic-ellipse", seconds, folder),
             *runs(loop, "treadmill-trot", seconds, folder),
+            *robot(loop, "robot-q8bot-trot", ["duration=3"]),
+            *robot(loop, "robot-q8bot-trot", ["duration=3", "robot.servo=ideal"]),
             asked(loop, 1, 2.0, 0.15),
             asked(loop, 64, 0.8, 0.9),
             environment(64, 2),
