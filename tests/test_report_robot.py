@@ -8,14 +8,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from matplotlib.axes import Axes
 
 from fivebar_sim import Scenario, report, run
-from fivebar_sim.errors import ArgumentError
+from fivebar_sim.arrays import Array
 from fivebar_sim.metrics.catalogue import shown
 from fivebar_sim.metrics.limits import look_up
 from fivebar_sim.report import look, robot, robot_figures
 from fivebar_sim.robots import LEGS
 from fivebar_sim.robots.columns import trunk
+from fivebar_sim.runs import stored
 from fivebar_sim.runs.stored import StoredRun
 
 SHORT = ("duration=0.5", "path.ramp=0.2", "robot.servo=ideal", "limits={}", "limits.robot.falls=0")
@@ -44,8 +46,8 @@ def test_table_of_legs_has_the_runs_numbers(page: str, trot: StoredRun) -> None:
     rows = re.findall(r"<tr><th scope=\"row\">(.*?)</th>(.*?)</tr>", part)
     cells = {label: re.findall(r"<td[^>]*>(.*?)</td>", rest) for label, rest in rows}
     for key, label, unit in robot.ROWS:
-        if key.startswith("heat"):
-            assert label not in cells  # this servo has no winding
+        if key.startswith(("heat", "side")):
+            assert label not in cells  # this servo has no winding, these legs no S
             continue
         wanted = [shown(unit, look_up(trot.metrics, f"legs.{leg}.{key}")) for leg in LEGS]
         assert [unescape(cell).replace("\xa0", " ") for cell in cells[label]] == wanted
@@ -75,10 +77,39 @@ def test_outline_points_where_the_trunk_faces(trot: StoredRun) -> None:
     assert 0.04 < 1e-3 * np.hypot(*nose) < 0.1
 
 
-def test_robots_are_not_compared(tmp_path: Path) -> None:
-    stand = Scenario.load(
-        "robot-q8bot-stand", ["duration=0.05", "path.seconds=0.05", "path.ramp=0.02", "limits={}"]
-    )
-    places = [run(stand).write(tmp_path / name) for name in ("one", "two")]
-    with pytest.raises(ArgumentError, match="runs of robots are not compared yet"):
-        report.write(places, tmp_path / "both.html")
+def test_robots_are_compared_line_by_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """One on a floor, and one that is held in the air: it has no trunk and no force."""
+    short = ["duration=0.05", "path.seconds=0.05", "path.ramp=0.02", "limits={}"]
+    read = []
+    for name, own in (("floor", []), ("air", ["scene=air"])):
+        found = run(Scenario.load("robot-q8bot-stand", [*short, *own]))
+        read.append(StoredRun(Path(name), found.scenario, found.record, found.measured))
+    with look.project_style():
+        drawn = {one.key: one for one in robot.compared(read)}
+    assert [*drawn] == ["from-above", "pose", "torque", "tracking-error"]
+    (way,) = lines(drawn["from-above"].figure.axes[0])
+    np.testing.assert_allclose(way[0][-1], 1e3 * read[0].record["trunk_x"][-1])
+
+    torque, force = (lines(ax) for ax in drawn["torque"].figure.axes)
+    motors = [read[1].record[f"{leg}_torque_{m}"][-1] for leg in LEGS for m in "AE"]
+    np.testing.assert_allclose(torque[1][1][-1], 1e3 * np.sqrt(np.mean(np.square(motors))))
+    feet = sum(read[0].record[f"{leg}_ground_z"][-1] for leg in LEGS)
+    np.testing.assert_allclose(force[0][1][-1], feet)
+    assert np.isnan(force[1][1]).all()
+
+    # The page is put together as that of legs; its figures are drawn above.
+    monkeypatch.setattr(robot, "compared", lambda runs: [])
+    monkeypatch.setattr(stored, "read", lambda path: read[path.name == "air"])
+    report.write([Path("floor"), Path("air")], tmp_path / "both.html")
+    page = (tmp_path / "both.html").read_text()
+    assert "Comparison of floor, air" in page
+    assert "scene" in page.partition("What differs in the scenarios")[2].partition("</table>")[0]
+
+
+def lines(ax: Axes) -> list[tuple[Array, Array]]:
+    """Return x and y of the lines of the runs."""
+    return [
+        (np.asarray(line.get_xdata(), dtype=float), np.asarray(line.get_ydata(), dtype=float))
+        for line in ax.lines
+        if line.get_gid() == "run"
+    ]

@@ -46,9 +46,9 @@ def names(runs: Sequence[StoredRun]) -> list[str]:
 
 def figures(runs: Sequence[StoredRun]) -> list[Drawn]:
     """Return the figures with all runs overlaid; call it within `look.project_style`."""
-    drawn = [_foot_paths(runs), *(_lines(runs, *each) for each in PLOTS)]
+    drawn = [_foot_paths(runs), *(lines(runs, *each) for each in PLOTS)]
     grounded = [run for run in runs if "ground_z" in run.record]
-    return drawn + ([_lines(runs, *GROUND)] if grounded else [])
+    return drawn + ([lines(runs, *GROUND)] if grounded else [])
 
 
 def page(runs: Sequence[StoredRun], drawn: list[Drawn]) -> str:
@@ -71,20 +71,20 @@ def page(runs: Sequence[StoredRun], drawn: list[Drawn]) -> str:
     return html.page(f"Comparison of {', '.join(called)}", parts)
 
 
-def _look(k: int, runs: Sequence[StoredRun]) -> dict[str, Any]:
+def style(k: int, runs: Sequence[StoredRun]) -> dict[str, Any]:
     """Return colour, style and width of the lines of run k."""
     # Later runs are drawn on top, so earlier ones are wider: equal lines stay visible.
     width = 2.6 - 1.6 * k / max(len(runs) - 1, 1)
     return {"color": colour(f"run-{k % COLOURS + 1}"), "ls": STYLES[k // COLOURS], "lw": width}
 
 
-def _legend(figure: Figure, ax: Axes, called: Sequence[str]) -> None:
+def legend(figure: Figure, ax: Axes, called: Sequence[str]) -> None:
     """Name the lines of an axes above the figure."""
     shorter = [name if len(name) <= 40 else f"{name[:18]} ... {name[-18:]}" for name in called]
-    lines = [line for line in ax.lines if line.get_gid() == "run"]
+    drawn = [line for line in ax.lines if line.get_gid() == "run"]
     # Matplotlib leaves out labels that begin with "_", so the names are set afterwards.
-    legend = figure.legend(lines, ["" for _ in lines], loc="outside upper center", ncols=1)
-    for entry, name in zip(legend.get_texts(), shorter, strict=True):
+    box = figure.legend(drawn, ["" for _ in drawn], loc="outside upper center", ncols=1)
+    for entry, name in zip(box.get_texts(), shorter, strict=True):
         entry.set_text(name)
 
 
@@ -95,9 +95,9 @@ def _foot_paths(runs: Sequence[StoredRun]) -> Drawn:
         ax.plot(*(1e3 * points(run.record, "target")).T, color=colour("wash"), lw=4, alpha=0.35)
 
     for k, run in enumerate(runs):
-        ax.plot(*(1e3 * points(run.record, "foot")).T, gid="run", **_look(k, runs))
+        ax.plot(*(1e3 * points(run.record, "foot")).T, gid="run", **style(k, runs))
 
-    _legend(figure, ax, names(runs))
+    legend(figure, ax, names(runs))
     return Drawn(
         "foot-path",
         "Foot paths",
@@ -110,7 +110,7 @@ def _foot_paths(runs: Sequence[StoredRun]) -> Drawn:
 Column = Callable[[StoredRun], Array]
 
 
-def _lines(
+def lines(
     runs: Sequence[StoredRun],
     key: str,
     title: str,
@@ -138,14 +138,14 @@ def _lines(
         for k, run in enumerate(runs):
             values = column(run)
             rows = draw.highest(values) if worst else draw.envelope(values)
-            ax.plot(run.record["time"][rows], values[rows], gid="run", **_look(k, runs))
+            ax.plot(run.record["time"][rows], values[rows], gid="run", **style(k, runs))
         if worst:
             _by_powers(ax, [float(column(run).max()) for run in runs])
         # The ground's metrics are of the whole run.
         elif key != "ground":
             cut |= _by_measured(ax, runs, column)
 
-    _legend(figure, axes[0], names(runs))
+    legend(figure, axes[0], names(runs))
     alt = f"Lines over time of {', '.join(names(runs))}: {', '.join(columns)}."
 
     return Drawn(key, title, caption + scaled.CUT * cut, alt, figure)

@@ -41,15 +41,13 @@ def write(runs: Sequence[Path], out: Path | None = None, png: Path | None = None
         raise RunDirectoryError(f"cannot write {place}: a directory is there")
 
     read = [stored.read(path) for path in runs]
-    if len(read) > 1 and recorded.all_of_robots(read):
-        raise ArgumentError(
-            f"runs of robots are not compared yet: a report has one, got {len(read)}"
-        )
     # All content is ready before the first file is written; the page comes last.
     files: dict[Path, bytes] = {}
     with look.project_style():
-        kind = robot if recorded.all_of_robots(read) else single
-        drawn = kind.figures(read[0]) if len(read) == 1 else comparison.figures(read)
+        robots = recorded.all_of_robots(read)
+        kind = robot if robots else single
+        overlaid = robot.compared if robots else comparison.figures
+        drawn = kind.figures(read[0]) if len(read) == 1 else overlaid(read)
         page = kind.page(read[0], drawn) if len(read) == 1 else comparison.page(read, drawn)
         if png is not None:
             files |= {png / f"{one.key}.png": look.png(one.figure) for one in drawn}
