@@ -23,7 +23,7 @@ from fivebar_sim.walking.touching import depths
 from fivebar_sim.walking.walk import Walk, walk, wrench
 
 ROUGH = 'scene.ground={kind="rough", height="5 mm", cell="20 mm", size="1 m", seed=3}'
-SHORT = ("duration=0.35", "limits={}", "path.ramp=0.1")
+SHORT = ("duration=0.3", "limits={}", "path.ramp=0.1")
 Q8BOT = Robot.load("q8bot")
 
 
@@ -170,7 +170,7 @@ def test_a_robot_that_walks_against_a_wall_says_what_touches_it() -> None:
 def test_a_fall_on_rough_ground_says_when_and_why() -> None:
     """Its mass is beyond the feet of its left legs."""
     went = walked(ROUGH, "robot.trunk.center=[0.0, 0.08, 0.006]", name="robot-q8bot-stand")
-    assert went.falls[0].time < 0.35
+    assert went.falls[0].time < 0.3
     assert went.falls[0].why.startswith("the trunk touches the floor, leaning")
 
 

@@ -141,7 +141,10 @@ def _send_leg(
     if hip.side_step is None:
         stream.log(root, fixed, static=True)
     else:
-        stream.send_columns(root, drawn, _swinging(hip, record[places.SWING][rows]))
+        swing = record[places.SWING][rows]
+        origin = places.in_trunk(hip, np.zeros((len(swing), 2)), swing)
+        frames = rr.Transform3D.columns(translation=origin, quaternion=swung(hip, swing))
+        stream.send_columns(root, drawn, frames)
     # Without the ground: the hip hangs on the trunk, not on a rail.
     moved = drawn_motion(_in_air(record), rows)
     own = look._replace(root=f"{root}/", label=look.label and name)
@@ -155,18 +158,22 @@ def _send_leg(
     stream.log(f"{root}/{foot.TARGET_PATH}", path, static=True)
 
 
-def _swinging(hip: Hip, swing: Array) -> rr.ComponentColumnList:
-    """Return where a leg's hip frame is in the trunk's, as its motor S turns it [rad]."""
-    import rerun as rr
+def swung(hip: Hip, swing: Array) -> Array:
+    """Return how a leg's hip frame is turned in the trunk's by its motor S, (N, 4).
 
+    Args:
+        hip: The hip.
+        swing: Angle of S [rad], (N,).
+
+    Returns:
+        Quaternions (x, y, z, w).
+    """
     half = 0.5 * swing
     still = np.zeros_like(half)
     # Turned about x; of a mirrored leg after half a turn about z.
     turned = [still, -np.sin(half), np.cos(half), still]
     straight = [np.sin(half), still, still, np.cos(half)]
-    quaternion = np.stack(turned if hip.mirrored else straight, axis=-1)
-    origin = places.in_trunk(hip, np.zeros((len(swing), 2)), swing)
-    return rr.Transform3D.columns(translation=origin, quaternion=quaternion)
+    return np.stack(turned if hip.mirrored else straight, axis=-1)
 
 
 def _in_air(record: Record) -> Record:
