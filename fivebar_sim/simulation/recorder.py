@@ -34,6 +34,8 @@ class Recorder:
         self._planned = planned
         self._done = 0
         self._before = planned.start
+
+        # Of every step: what the record is made of, and what the metrics need besides.
         self._columns: Record = {}
         self._heights: Record = {}
         self._signs: NDArray[np.int8] = np.empty((3, steps), dtype=np.int8)
@@ -93,6 +95,8 @@ class Recorder:
     def unrecorded(self) -> Unrecorded:
         """The per-step data that the metrics need and the record leaves out."""
         planned = self._planned
+        record_so_far = self.record
+
         return Unrecorded(
             steps=energy.Steps(planned.start, self._constraint, planned.pushes),
             saturated=self._saturated,
@@ -100,8 +104,8 @@ class Recorder:
             warnings=self._warnings,
             ranges=record.ranges(planned.model),
             trunk=record.lowest(planned.model),
-            growth=record.growth(planned, self.record),
-            jolts=record.jolts(planned, self.record),
+            growth=record.growth(planned, record_so_far),
+            jolts=record.jolts(planned, record_so_far),
             signs=self._signs,
             heights=self._heights,
         )
