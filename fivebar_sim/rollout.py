@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Any, NamedTuple, overload
+from typing import TYPE_CHECKING, Any, NamedTuple, cast, overload
 
 import numpy as np
 
@@ -258,18 +258,27 @@ def execute(planned: AnyPlan, watch: Watch | None = None) -> Result:
     return _result(planned, _recorded([planned], 1, watch)[0])
 
 
-def run_all(plans: Sequence[AnyPlan], nthread: int = 1) -> list[Result]:
+def run_all(plans: Sequence[AnyPlan], nthread: int = 1, device: str | None = None) -> list[Result]:
     """Return the results of plans, those of one timestep and length simulated together.
 
-    The bits are the same as one by one.
+    The bits are the same as one by one. On a device MuJoCo Warp takes the steps, in single
+    precision; record, metrics and verdict are then made of its states as of any others.
 
     Args:
         plans: The plans.
         nthread: Number of threads; 0 is one for every processor.
+        device: None for MuJoCo on the processor, "cuda:0" for a card, "cpu-warp" for Warp on the
+            processor.
 
     Raises:
+        ArgumentError: A device of another name.
+        ConfigError: The device is not there, cannot run a plan, or has too little memory.
+        ExtraError: MuJoCo Warp is not installed.
         DivergedError: A simulation broke down; says which, and when.
     """
+    if device is not None:
+        return _run_on(device, plans)
+
     # Groups mix the order of the plans; results go back to it at the end.
     results: dict[int, Result] = {}
     groups: dict[Kind, dict[int, Plan]] = {}
@@ -286,6 +295,19 @@ def run_all(plans: Sequence[AnyPlan], nthread: int = 1) -> list[Result]:
             # Each is freed once it is measured.
             results[i] = _result(planned, recorders.pop(0))
     return [results[i] for i in range(len(plans))]
+
+
+def _run_on(device: str, plans: Sequence[AnyPlan]) -> list[Result]:
+    """Return the results of plans that are simulated on a device; see `run_all`."""
+    # Warp is an extra, and slow to import.
+    from fivebar_sim.warp.batch import simulated_on
+
+    recorders = [Recorder(planned) for planned in plans if isinstance(planned, Plan)]
+    for rows, states in simulated_on(device, plans):
+        for row, i in enumerate(rows):
+            recorders[i].add(states.rows(slice(row, row + 1)))
+    pairs = zip(plans, recorders, strict=True)
+    return [_result(cast(Plan, planned), _unbroken(each)) for planned, each in pairs]
 
 
 def _walked(planned: RobotPlan, watch: Watch | None = None) -> Result:
@@ -312,10 +334,14 @@ def _recorded(plans: Sequence[Plan], nthread: int, watch: Watch | None = None) -
     except feedback.NoAnswerError as stopped:
         raise recorders[stopped.row].broken(stopped) from stopped.__cause__
 
-    for recorder in recorders:
-        if recorder.error is not None:
-            raise recorder.broken(recorder.error)
-    return recorders
+    return [_unbroken(recorder) for recorder in recorders]
+
+
+def _unbroken(recorder: Recorder) -> Recorder:
+    """Return a recorder whose simulation did not break down."""
+    if recorder.error is not None:
+        raise recorder.broken(recorder.error)
+    return recorder
 
 
 def _simulated(plans: Sequence[Plan], nthread: int, watch: Watch | None = None) -> Iterator[States]:

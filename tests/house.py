@@ -30,7 +30,7 @@ LEVELS = (
     "formats",
     "recording tasks",
     "walking",
-    "runs environment gym",
+    "runs environment gym warp",
     "report",
     "page rollout vector",
     "identify overlay regression sb3 sweep",
