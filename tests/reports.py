@@ -4,19 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from html import escape
 from html.parser import HTMLParser
 from pathlib import Path
 from typing import NamedTuple
 
 import pytest
-from matplotlib.figure import Figure
 
-from fivebar_sim.report import in_plane, look, over_time
+from fivebar_sim.report import in_plane, over_time
 from fivebar_sim.report.draw import Drawn
 from fivebar_sim.runs.stored import StoredRun
 
-UNDRAWN = "not drawn"
 VOID = {"meta", "br", "link", "img", "input", "hr", "wbr"}
 
 
@@ -92,19 +89,4 @@ def unfitted() -> Iterator[None]:
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(ConstrainedLayoutEngine, "execute", lambda engine, figure: None)
-        yield
-
-
-@contextmanager
-def few_drawn() -> Iterator[None]:
-    """Draw but two figures of a page; the others are `UNDRAWN`, with their alternatives."""
-    draw = look.svg
-
-    def svg(figure: Figure, key: str, alt: str) -> str:
-        if key in ("foot-path", "torque"):
-            return draw(figure, key, alt)
-        return f'<svg role="img" aria-label="{escape(alt)}">{UNDRAWN}</svg>'
-
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(look, "svg", svg)
         yield
