@@ -263,11 +263,13 @@ def _check_friction(scenario: RobotScenario) -> None:
     """Raise where what passes through the gears is not known: off level floors, beside motors S."""
     if not scenario.servo.records_friction:
         return
+
     where = ""
     if scenario.robot.side_step is not None:
         where = "with hips.side_step"
     elif isinstance(scenario.scene, Floor) and not scenario.scene.ground.level:
         where = "on uneven ground"
+
     if where:
         raise ConfigError(
             f"servo.friction of a robot {where} must be a number [N m]: how friction changes with "
