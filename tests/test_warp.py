@@ -157,7 +157,6 @@ def test_legs_that_differ_move_as_on_the_processor() -> None:
         for name in ("torque_A", "torque_E"):
             assert np.abs(there.record[name] - here.record[name]).max() < 5e-5  # [N m]
         clipped = [result.metrics["load"]["saturated"]["A"] for result in (there, here)]
-        assert clipped[1] > 0.01
         assert clipped[0] == pytest.approx(clipped[1], abs=0.01)
 
 

@@ -18,6 +18,9 @@ UNKNOWN_FLAGS = (
 )
 """Flags that MuJoCo Warp refuses: it never resets a leg by itself, and knows no such phase."""
 
+UNREAD = ("dof_length", "key_qpos", "key_ctrl")
+"""What no step reads: lengths for legs that sleep, which none does, and the keyframes."""
+
 ITERATIONS = 20
 """Most iterations of the solver on the processor, where Warp takes all of them, needed or not.
 
@@ -66,7 +69,7 @@ def structure(model: mujoco.MjModel) -> tuple[bytes, ...]:
     found = []
     for owner, kind in ((model, types), (model.opt, options)):
         for field in dataclasses.fields(kind):
-            if _is_number(field) or not hasattr(owner, field.name):
+            if field.name in UNREAD or _is_number(field) or not hasattr(owner, field.name):
                 continue
             value = getattr(owner, field.name)
             if isinstance(value, int | np.ndarray):
