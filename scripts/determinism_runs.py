@@ -31,6 +31,7 @@ class Plain:
     def set_models(self, models: Sequence[Any]) -> None:
         """Give each leg its own model, and begin anew."""
         self._models = list(models)
+        self._expanded: dict[str, np.ndarray] = {}
         self.model = self._models[0]
         self.state = np.zeros((self.nsim, mujoco.mj_stateSize(self.model, WHOLE)))
         self._outputs: dict[str, np.ndarray] = {}
@@ -49,6 +50,12 @@ class Plain:
 
         rows = [getattr(data, name) for data in self._datas]
         return self._outputs.setdefault(name, np.array(rows))
+
+    def expand(self, name: str) -> np.ndarray:
+        """Return a field of the model, a row a leg: what a row holds is its leg's in every step."""
+        owner, field = _owner(self.model, name)
+        rows = np.array([getattr(owner, field)] * self.nsim)
+        return self._expanded.setdefault(name, rows)
 
     def step(self) -> None:
         """Take one step with the commands that `bind` gave to be filled."""
@@ -80,6 +87,10 @@ class Plain:
         return {item: np.stack(each) for item, each in rows.items()}
 
     def _load(self, i: int) -> Any:
+        for name, rows in self._expanded.items():
+            owner, field = _owner(self._models[i], name)
+            setattr(owner, field, rows[i])
+
         data = self._datas[i]
         data.time = self.time[i]
         data.qpos[:] = self.qpos[i]
@@ -97,6 +108,12 @@ class Plain:
         self.qacc_warmstart[i] = data.qacc_warmstart
         self.warning[i, :, 0] = data.warning.lastinfo
         self.warning[i, :, 1] = data.warning.number
+
+
+def _owner(model: Any, name: str) -> tuple[Any, str]:
+    """Return what has a field of a model, which for "opt.x" are its options, and its name there."""
+    option = name.removeprefix("opt.")
+    return (model if option == name else model.opt), option
 
 
 def _stepped(

@@ -144,7 +144,7 @@ def test_runs_are_called_as_their_directories_or_by_their_paths(
 
 def test_what_lacks_more_than_the_recording_is_no_run(run: Path) -> None:
     (run / "recording.rrd").unlink()
-    (run / "metrics.json").unlink()
-    lacks = r"is not a run directory: it lacks metrics\.json, recording\.rrd; `fivebar run "
+    (run / "rollout.parquet").unlink()
+    lacks = r"is not a run directory: it lacks rollout\.parquet, recording\.rrd; `fivebar run "
     with pytest.raises(RunDirectoryError, match=lacks), recording_file.opened([run]):
         pass

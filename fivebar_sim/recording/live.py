@@ -26,7 +26,7 @@ from fivebar_sim.recording.relay import Relay
 from fivebar_sim.recording.summary import colours
 from fivebar_sim.scenario.scenes import Ground
 from fivebar_sim.simulation.plan import Plan
-from fivebar_sim.simulation.record import Part, columns
+from fivebar_sim.simulation.record import Part, columns, points
 from fivebar_sim.simulation.steps import States, Watch
 
 if TYPE_CHECKING:
@@ -199,7 +199,8 @@ class _Sender:
 
     def _send(self, states: States) -> None:
         """Send some steps."""
-        record = columns(self._planned, Part(states, self._begin, self._before))
+        part = Part(states, self._begin, self._before)
+        record = columns(self._planned, part, points(self._planned, part))
         # A single row does not tell the timestep, which the plots need.
         if len(record["time"]) > 1:
             self._show(record)
