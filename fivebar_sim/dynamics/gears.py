@@ -101,10 +101,10 @@ def through(bars: Bars, q: Array, constraint: Array, foot: Foot | None) -> Throu
     # A leg that has come to lie in line has lost its branch: its loop's force is not known.
     det = BC[0] * DC[1] - BC[1] * DC[0]
     with np.errstate(divide="ignore", invalid="ignore"):
-        f = (
-            np.nan_to_num((at_B * DC[0] + k_D * BC[0]) / det, posinf=0.0, neginf=0.0),
-            np.nan_to_num((at_B * DC[1] + k_D * BC[1]) / det, posinf=0.0, neginf=0.0),
-        )
+        f_x = (at_B * DC[0] + k_D * BC[0]) / det
+        f_z = (at_B * DC[1] + k_D * BC[1]) / det
+    f = (np.where(np.isfinite(f_x), f_x, 0.0), np.where(np.isfinite(f_z), f_z, 0.0))
+
     outer_A = k_B + _cross(L1, (f[0] + g[0], f[1] + g[1]))
     outer_E = k_D - _cross(ED, f)
     gear = np.stack([k_A - outer_A, k_E - outer_E], axis=-1)

@@ -106,12 +106,17 @@ class Gears:
         # What broke down is found later; here it must only not become another error.
         with np.errstate(all="ignore"):
             found = self._law.largest(torque, outer, v[:, self._turning])
-        return np.maximum(np.nan_to_num(found, posinf=LEAST), self._least)
+        return np.maximum(np.where(np.isfinite(found), found, 0.0), self._least)
 
     def took(self, step: Step) -> None:
         """Remember a step."""
         with np.errstate(all="ignore"):
-            self.memory = np.stack([self._motors.torque(step), self._outer(step)], axis=1)
+            memory = np.empty_like(self.memory)
+            memory[:, 0] = self._motors.torque(step)
+            memory[:, 1] = self._outer(step)
+
+        # Who kept the last one has it still.
+        self.memory = memory
 
     def _outer(self, step: Step) -> Array:
         """Return the torque from outside at each motor's joint [N m], (n, 2 k).
@@ -285,19 +290,24 @@ def rubbed(
         record: What to record.
         rollout: Takes steps.
     """
-    wanted = tuple(dict.fromkeys([*record, *RECORDED, "sensordata"]))
+    known = (*RECORDED, "sensordata")
+    wanted = tuple(dict.fromkeys([*record, *known]))
     friction = batch.expand("dof_frictionloss")
+    # Views of the state, which change with every step.
+    q_next = batch.qpos
+    v_next = batch.qvel
     out: dict[Any, Array] = {}
 
     for k in range(ctrl.shape[1]):
-        q = batch.qpos.copy()
-        v = batch.qvel.copy()
+        q = q_next.copy()
+        v = v_next.copy()
         friction[:, gears.dofs] = gears.largest(v)
         rows = rollout(ctrl[:, k : k + 1], wanted)
-        found = {item: each[:, 0] for item, each in rows.items()}
-        gears.took(Step(q, v, batch.qpos, batch.qvel, ctrl[:, k], found))
+        found = {item: rows[item][:, 0] for item in known}
+        gears.took(Step(q, v, q_next, v_next, ctrl[:, k], found))
         for item in record:
-            shape = (len(ctrl), ctrl.shape[1], *rows[item].shape[2:])
-            whole = out.setdefault(item, np.empty(shape, rows[item].dtype))
-            whole[:, k] = rows[item][:, 0]
+            if item not in out:
+                shape = (len(ctrl), ctrl.shape[1], *rows[item].shape[2:])
+                out[item] = np.empty(shape, rows[item].dtype)
+            out[item][:, k] = rows[item][:, 0]
     return out

@@ -84,6 +84,9 @@ def rollout(
         at = done[ids, None] + np.arange(span)
         part = _Part(stepper, clipping.rows(ids), ids, wanted)
         part.take(ctrl[ids[:, None], np.minimum(at, steps - 1)], steps - done[ids])
+        if not out and (part.taken == steps).all() and not part.stopped.any():
+            return part.rows
+
         for item, rows in part.rows.items():
             whole = out.setdefault(item, np.empty((len(ctrl), steps, *rows.shape[2:]), rows.dtype))
             for row, (i, n) in enumerate(zip(ids, part.taken, strict=True)):
@@ -143,15 +146,22 @@ class _Part:
         begun = self._clipping.begun(u, q, v)
         asked = self._clipping.ended(begun, u, q, *self._motors(self.rows[STATE]))
 
+        wrong = (begun != asked).any(axis=-1)
+        warns = self._warns(everyone)
+        if not wrong.any() and not warns.any() and (most >= u.shape[1]).all():
+            self.taken = np.full(len(ctrl), u.shape[1])
+            self.stopped = warns
+            return
+
         # After a warning a simulation stands still: its last step is the last that took time.
         moves = np.diff(self.rows[STATE][..., 0], axis=1, prepend=-np.inf) > 0.0
         last = moves.sum(axis=1)
         end = np.minimum(last, most)
-        wrong = (begun != asked).any(axis=-1) & (np.arange(u.shape[1]) < end[:, None])
+        wrong &= np.arange(u.shape[1]) < end[:, None]
         first = np.where(wrong.any(axis=1), wrong.argmax(axis=1), end)
 
         self.taken = np.minimum(first + 1, end)
-        self.stopped = self._warns(everyone) & (first == last)
+        self.stopped = warns & (first == last)
         # Warnings of steps that are thrown away do not count.
         self._stepper.warning[self._ids] = np.where(
             self.stopped[:, None, None], self._stepper.warning[self._ids], self._warned
@@ -240,6 +250,8 @@ class _Part:
 
     def _before(self) -> Array:
         """Return the state before each step, (n, N, 1 + nq + nv)."""
+        if self.rows[STATE].shape[1] == 1:
+            return self._start[STATE][:, None]
         return np.concatenate([self._start[STATE][:, None], self.rows[STATE][:, :-1]], axis=1)
 
     def _motors(self, state: Array) -> tuple[Array, Array]:
