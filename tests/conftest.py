@@ -59,9 +59,9 @@ def pytest_collection(session: pytest.Session) -> None:
 def pytest_collection_finish() -> None:
     """Keep the collector from going through all that was imported and collected, again and again.
 
-    None of it will ever be garbage, and it is a million objects.
+    Hardly any of it will ever be garbage, and it is a million objects: even to look through them
+    once, for what little could go, takes longer than most tests.
     """
-    gc.collect()
     gc.freeze()
     gc.set_threshold(10_000, 20, 20)
     gc.enable()

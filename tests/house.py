@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import ast
 import functools
-import gc
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
@@ -100,12 +99,7 @@ def within(node: ast.AST) -> Iterator[ast.stmt]:
 @functools.cache
 def parsed(source: str) -> ast.Module:
     """Return a source's tree, once for all that is asked of it."""
-    # A tree is all kept: the collector would go through a million nodes in vain.
-    gc.disable()
-    try:
-        return ast.parse(source)
-    finally:
-        gc.enable()
+    return ast.parse(source)
 
 
 def statements(node: ast.AST, parents: tuple[ast.AST, ...] = ()) -> Iterator[tuple[ast.AST, str]]:
