@@ -80,5 +80,5 @@ def test_killed_runs_are_whole_or_absent(writer: Writer) -> None:
 
 
 @pytest.mark.long
-def test_two_hundred_killed_runs_are_whole_or_absent(writer: Writer) -> None:
-    killed(writer, 200, seed=2)
+def test_five_hundred_killed_runs_are_whole_or_absent(writer: Writer) -> None:
+    killed(writer, 500, seed=2)

@@ -173,7 +173,7 @@ def test_a_slow_drip_is_ended(server: web.Server, monkeypatch: pytest.MonkeyPatc
 
 
 def test_many_at_once_are_served(server: web.Server) -> None:
-    """Hundreds that say nothing and a crowd that asks, all before the server accepts any."""
+    """Hundreds that say nothing, or half of it, before the server accepts any, and a crowd."""
     accept = server.get_request
     gate = threading.Event()
 
@@ -182,10 +182,12 @@ def test_many_at_once_are_served(server: web.Server) -> None:
         return accept()
 
     server.get_request = late
-    silent = [socket.create_connection(("127.0.0.1", server.port), 10) for _ in range(100)]
+    half = [socket.create_connection(("127.0.0.1", server.port), 10) for _ in range(300)]
+    for each in half[::2]:
+        each.sendall(b"GET / HT")
     gate.set()
     with ThreadPoolExecutor(50) as pool:
-        answers = list(pool.map(lambda _: ask(server)[0], range(100)))
-    assert answers == [200] * 100
-    for each in silent:
+        answers = list(pool.map(lambda _: ask(server)[0], range(200)))
+    assert answers == [200] * 200
+    for each in half:
         each.close()
