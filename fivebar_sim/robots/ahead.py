@@ -9,24 +9,14 @@ from fivebar_sim.arrays import Array
 from fivebar_sim.paths import FootPath, Sample
 
 
-class Ahead(FootPath, frozen=True, tag="ahead"):
-    """The path of one leg of a gait: another path, some part of its period ahead.
-
-        x(t) = +-(m + stride (x_path(t + phase T) - m)),   z(t) = z_path(t + phase T)
+class Led(FootPath, frozen=True):
+    """A path that another one leads: it repeats, ends and comes to rest with that one.
 
     Attributes:
-        path: The gait's path.
-        phase: Parts of its period T that the leg is ahead.
-        stride: What its x is multiplied by, about `middle`.
-        middle: m, the middle of the path's x [m].
-        mirrored: Whether x of the leg's hip frame points backward: then all of x is negative.
+        path: The other path.
     """
 
     path: FootPath
-    phase: float
-    stride: float
-    middle: float
-    mirrored: bool
 
     @property
     def period(self) -> float | None:
@@ -42,6 +32,25 @@ class Ahead(FootPath, frozen=True, tag="ahead"):
     def moves(self) -> float:
         """How long the foot moves [s]."""
         return self.path.moves
+
+
+class Ahead(Led, frozen=True, tag="ahead"):
+    """The path of one leg of a gait: another path, some part of its period ahead.
+
+        x(t) = +-(m + stride (x_path(t + phase T) - m)),   z(t) = z_path(t + phase T)
+
+    Attributes:
+        path: The gait's path.
+        phase: Parts of its period T that the leg is ahead.
+        stride: What its x is multiplied by, about `middle`.
+        middle: m, the middle of the path's x [m].
+        mirrored: Whether x of the leg's hip frame points backward: then all of x is negative.
+    """
+
+    phase: float
+    stride: float
+    middle: float
+    mirrored: bool
 
     def nominal(self, time: ArrayLike) -> Sample:
         """Return the other path at a later time, its x scaled; see `FootPath.nominal`."""

@@ -14,9 +14,9 @@ from numpy.typing import ArrayLike
 
 from fivebar_sim.arrays import Array
 from fivebar_sim.errors import ArgumentError
-from fivebar_sim.paths import FootPath, Sample
+from fivebar_sim.paths import Sample
 from fivebar_sim.paths.base import ease, times
-from fivebar_sim.robots.ahead import Ahead
+from fivebar_sim.robots.ahead import Ahead, Led
 from fivebar_sim.robots.robot import Hip
 
 
@@ -28,7 +28,7 @@ class Across(NamedTuple):
     change: Array
 
 
-class Sideways(FootPath, frozen=True, tag="sideways"):
+class Sideways(Led, frozen=True, tag="sideways"):
     """The path of a leg's foot within its plane, which S turns as the foot goes to the side.
 
     Attributes:
@@ -42,21 +42,6 @@ class Sideways(FootPath, frozen=True, tag="sideways"):
     sideways: float
     across: float
     along: float
-
-    @property
-    def period(self) -> float | None:
-        """Time after which the path repeats [s]; None where it does not."""
-        return self.path.period
-
-    @property
-    def span(self) -> float:
-        """How long the path is defined [s]."""
-        return self.path.span
-
-    @property
-    def moves(self) -> float:
-        """How long the foot moves [s]."""
-        return self.path.moves
 
     def nominal(self, time: ArrayLike) -> Sample:
         """Return the foot in the leg's own plane; see `FootPath.nominal`."""
