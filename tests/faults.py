@@ -17,7 +17,6 @@ import pytest
 
 from fivebar_sim import model, rollout
 from fivebar_sim.arrays import Array
-from fivebar_sim.model import leg as leg_model
 from fivebar_sim.simulation import plan as planning
 from fivebar_sim.simulation.steps import Legs
 
@@ -129,7 +128,16 @@ def longer(**factors: float) -> Put:
     def wrong(right: Callable[..., Any], leg: Any, **keys: Any) -> Any:
         return right(replace(leg, **{k: f * getattr(leg, k) for k, f in factors.items()}), **keys)
 
-    return around(leg_model, "leg_spec", wrong)
+    return around(model, "build", wrong)
+
+
+def unloaded(patch: pytest.MonkeyPatch) -> None:
+    """Build models without their payload."""
+
+    def wrong(right: Callable[..., Any], leg: Any, *, scene: Any, **keys: Any) -> Any:
+        return right(leg, scene=msgspec.structs.replace(scene, mass=0.0), **keys)
+
+    around(model, "build", wrong)(patch)
 
 
 def commanded(change: Callable[[Array], Array]) -> Put:
@@ -186,7 +194,7 @@ MODEL = (
     Fault("all lengths 1 % long", ELLIPSE, longer(**LENGTHS)),
     Fault("foot bent to the other side", EIGHT, longer(bend=-1.0)),
     Fault("base tilted to the other side", EIGHT, longer(tilt=-1.0)),
-    Fault("payload left out", "payload-ellipse", around(leg_model, "_load", lambda *_: None)),
+    Fault("payload left out", "payload-ellipse", unloaded),
     Fault("torque limit left out", "airhockey-pd", built(fixed("actuator_forcelimited", 0))),
     Fault("gear friction left out", "q8bot-xl330", built(fixed("dof_frictionloss", 0.0))),
     Fault("foot friction 10 % low", TROT, built(scaled("geom_friction", 0.9))),

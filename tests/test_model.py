@@ -48,6 +48,23 @@ def test_file_stands_at_home() -> None:
     assert sum(data.warning.number) == 0
 
 
+def in_bytes(mj: mujoco.MjModel) -> bytes:
+    buffer = np.empty(mujoco.mj_sizeModel(mj), np.uint8)
+    mujoco.mj_saveModel(mj, None, buffer)
+    return buffer.tobytes()
+
+
+def test_built_model_is_the_caller_s_own() -> None:
+    """It is built once; who changes it changes nobody else's."""
+    changed = model.build(ODD, servo=Servo(), scene="rail")
+    changed.opt.timestep = 1.0
+    changed.body_mass[:] = 0.0
+    again = model.build(ODD, servo=Servo(), scene="rail")
+    with model.quiet():
+        compiled = model.leg_spec(ODD, servo=Servo(), scene=Rail()).compile()
+    assert in_bytes(again) == in_bytes(compiled) != in_bytes(changed)
+
+
 def test_file_is_the_classic_leg() -> None:
     """Every number of the file, but none of its joint stops' last digits."""
     file = mujoco.MjModel.from_xml_path(str(FILE))
