@@ -53,6 +53,9 @@ random legs torn slivers had up to 12 nodes of 3 deg, and they vanished on a fin
 CHARTS = ((0, 2), (0, 1), (2, 3))
 """The two of the four angles over which each chart is a grid."""
 
+NAMES = np.array([9, 3, 1])
+"""Times a triple: one number for it, in the order of triples and 0 where there is none."""
+
 
 class Aspect(NamedTuple):
     """The aspects of poses, each (...); two poses share one if all four agree, part not 0.
@@ -161,8 +164,14 @@ def all_aspects(leg: FiveBar, *, cells: int = CELLS) -> Aspect:
         ArgumentError: Unless cells is a whole number above 2.
     """
     atlas = _atlas(leg, cells)
-    found = np.unique(np.column_stack([atlas.triple, atlas.part])[atlas.part > 0], axis=0)
-    return Aspect(*found.T)
+    nodes = np.flatnonzero(atlas.part)
+    part = atlas.part[nodes]
+    # One number for an aspect, in the order of its four: NumPy is slow to compare rows.
+    name = (atlas.triple @ NAMES)[nodes] * (part.max(initial=0) + 1) + part
+    _, first = np.unique(name, return_index=True)
+    each = nodes[first]
+    s_A, s_E, assembly = atlas.triple[each].T
+    return Aspect(s_A, s_E, assembly, atlas.part[each])
 
 
 def _aspect(leg: FiveBar, points: Points, cells: int) -> Aspect:
@@ -214,8 +223,8 @@ def _draw_atlas(leg: FiveBar, cells: int) -> _Atlas:
     corners = _corners(q, _sheets(leg, points), cells)
     # Every node is linked with the corners of its own cells in all three charts.
     one = np.broadcast_to(np.arange(len(q))[:, None], corners.shape)
-    # One number for a triple, 0 where there is none: a million links are compared.
-    name = triple @ np.array([9, 3, 1])
+    # One number for a triple: a million links are compared.
+    name = triple @ NAMES
     joined = (name[:, None] != 0) & (name[:, None] == name[corners])
 
     return _Atlas(q, triple, _number_parts(name, _roots(len(q), one[joined], corners[joined])))
