@@ -16,6 +16,7 @@ from fivebar_sim.warp import device as devices
 from fivebar_sim.warp.limits import Limits
 from fivebar_sim.warp.memory import check_fits, data_of
 from fivebar_sim.warp.models import lean_models, put
+from fivebar_sim.warp.stepping import take_step
 
 CHUNK = 16e6
 """Numbers that are recorded before they are handed over, of all legs: 64 MB of the device."""
@@ -130,7 +131,7 @@ class DeviceLegs:
 
         if self._limits is not None:
             self._limits.begin()
-        self._mjw.step(self._model, data)
+        take_step(self._model, data)
         if self._limits is not None:
             self._limits.judge()
         else:

@@ -10,6 +10,7 @@ import numpy as np
 
 from fivebar_sim.simulation.clipping import MOST_MODES, Clipping
 from fivebar_sim.warp import device as devices
+from fivebar_sim.warp.stepping import take_step
 
 UNLIMITED = 1e30
 """Stands for no limit beside legs that have one [N m], in single precision."""
@@ -115,7 +116,7 @@ class Limits:
 
         for kept, now in zip(self._kept, self._state, strict=True):
             self._wp.copy(now, kept)
-        devices.mujoco_warp().step(self._model, data)
+        take_step(self._model, data)
         self.judge()
 
     @property
