@@ -17,11 +17,11 @@ from fivebar_sim.render.replay import replay
 from fivebar_sim.robots import LEGS, Floor, Robot, places
 from fivebar_sim.robots.columns import columns, of_leg
 from fivebar_sim.robots.gait import TROT, Gait
+from fivebar_sim.robots.hips import turned
+from fivebar_sim.robots.hips.sideways import Sideways
 from fivebar_sim.robots.measure import Trunk
 from fivebar_sim.robots.scenario import RobotScenario
-from fivebar_sim.robots.sideways import Sideways
 from fivebar_sim.walking.plan import plan_scenario
-from fivebar_sim.walking.recording import swung
 from fivebar_sim.walking.task import WalkTask
 from fivebar_sim.walking.walk import walk
 
@@ -63,7 +63,8 @@ def test_feet_are_planned_where_the_gait_has_them(robot: Robot) -> None:
         path = paths[leg]
         assert isinstance(path, Sideways)
         hip = robot.hips[leg]
-        found = places.in_trunk(hip, path.at(time).position, path.swing(time)) - np.array(hip.pos)
+        swing = path.swing(time)[:, None]
+        found = turned.in_trunk(hip, path.at(time).position, swing) - np.array(hip.pos)
         wanted = path.path.at(time).position
         x = -wanted[:, 0] if hip.mirrored else wanted[:, 0]
         np.testing.assert_allclose(found[:, 0], x, atol=1e-15)
@@ -72,7 +73,7 @@ def test_feet_are_planned_where_the_gait_has_them(robot: Robot) -> None:
 
         # The kinematics of a hip with side-step say the same, foot by foot.
         assert hip.side_step is not None
-        same = hips.SideStep(robot.leg, across=hip.across, along=hip.side_step.along)
+        same = hips.SideStep(robot.leg, across=hip.offset(hip.side_step)[1], along=-5e-3)
         mirror = np.array([-1.0, 1.0, 1.0]) if hip.mirrored else np.ones(3)
         in_plane = hips.leg_plane(same, mirror * (found + np.array(hip.pos) - np.array(hip.axis)))
         np.testing.assert_allclose(path.swing(time), in_plane.phi, atol=1e-12)
@@ -149,7 +150,7 @@ def test_S_bears_the_foots_force_beside_its_axis() -> None:
         last = {name: float(column[-1]) for name, column in record.items()}
         hip = robot.hips[leg]
         foot = np.array([last["foot_x"], last["foot_z"]])
-        _, y, z = places.in_trunk(hip, foot, last["theta_S"]) - np.array(hip.axis)
+        _, y, z = turned.in_trunk(hip, foot, [last["theta_S"]]) - np.array(hip.axis)
         down = z - robot.leg.foot_radius
         wanted = down * last["ground_y"] - y * (last["ground_z"] - turns)
         # It leans by less than a degree: what turns is not all at the foot's y.
@@ -171,8 +172,9 @@ def test_robot_walks_to_the_left_and_its_energy_closes(aside: Result) -> None:
 
 
 def test_record_scenario_and_pictures_have_the_motor(aside: Result) -> None:
-    assert [*aside.record] == columns(Floor(), side_step=True)
     scenario = aside.scenario
+    assert isinstance(scenario, RobotScenario)
+    assert [*aside.record] == columns(Floor(), motors=scenario.robot.hip_motors)
     assert Scenario.from_table(scenario.table(), "table", Path()) == scenario
     drawn = replay(aside.scenario, aside.record)
     assert drawn.walked is not None
@@ -186,15 +188,14 @@ def test_record_scenario_and_pictures_have_the_motor(aside: Result) -> None:
 
 def test_recorded_frame_turns_with_the_motor(robot: Robot) -> None:
     """What a recording says of a hip frame takes its points where they are in the trunk."""
-    swing = np.array([-0.4, 0.0, 0.3])
+    swing = np.array([[-0.4], [0.0], [0.3]])
     point = np.array([0.01, -0.04])
     for leg in ("FL", "RR"):
         hip = robot.hips[leg]
-        origin = places.in_trunk(hip, np.zeros((3, 2)), swing)
-        x, y, z, w = swung(hip, swing).T
-        axes = places.rotation(np.stack([w, x, y, z], axis=-1))
+        origin = turned.in_trunk(hip, np.zeros((3, 2)), swing)
+        axes = places.rotation(turned.quaternion(hip, swing))
         found = origin + axes @ np.array([point[0], 0.0, point[1]])
-        wanted = places.in_trunk(hip, np.tile(point, (3, 1)), swing)
+        wanted = turned.in_trunk(hip, np.tile(point, (3, 1)), swing)
         np.testing.assert_allclose(found, wanted, atol=1e-15)
 
 

@@ -23,9 +23,8 @@ from fivebar_sim.model.leg import HIP_HEIGHT, leg_spec, set_options, standing
 from fivebar_sim.robots import LEGS, Air, Floor, Hip, Robot, Scene
 from fivebar_sim.robots.floor import Payload
 from fivebar_sim.robots.ground import Ground
-from fivebar_sim.robots.places import in_trunk
+from fivebar_sim.robots.hips.turned import in_trunk
 from fivebar_sim.robots.push import Push
-from fivebar_sim.robots.robot import SideStep
 
 BACKWARD = (0.0, 0.0, 0.0, 1.0)
 """Half a turn about z, as a quaternion."""
@@ -52,12 +51,12 @@ def build_robot(
     """Return the compiled model of a robot, its loops closed in the legs' rest pose.
 
     On a floor qpos begins with the trunk's position (3) and quaternion (4). Then come (theta_A,
-    theta_B, theta_E, theta_D) of FL, FR, RL and RR, each after theta_S where legs have a motor S;
-    ctrl is (A, E) of each, after the commands of all S. Names are those of a
-    leg with the leg's name in front, `FL_A`; `trunk` is the body between them, and `FL_ground` the
-    force of the floor on a foot, along the world's axes, after a number that says whether there is
-    any; on uneven ground its torque and its place follow. The keyframe is `home`, in the air, or
-    `stand`, with the lowest foot on the floor.
+    theta_B, theta_E, theta_D) of FL, FR, RL and RR, each after theta_T and theta_S where legs have
+    these motors; ctrl is (A, E) of each, after the commands of all T and S, leg by leg. Names are
+    those of a leg with the leg's name in front, `FL_A`; `trunk` is the body between them, and
+    `FL_ground` the force of the floor on a foot, along the world's axes, after a number that says
+    whether there is any; on uneven ground its torque and its place follow. The keyframe is `home`,
+    in the air, or `stand`, with the lowest foot on the floor.
 
     Args:
         robot: The robot.
@@ -109,9 +108,8 @@ def robot_spec(
             _carry(spec, robot, scene.payload)
         _weigh(spec, robot)
         _push(spec, pushes)
-        if robot.side_step is not None:
-            for name in LEGS:
-                _turn(spec, robot.hips[name], robot.side_step, name)
+        for name in LEGS:
+            _turn(spec, robot.hips[name], name)
         for name in LEGS:
             leg = leg_spec(
                 robot.leg,
@@ -129,7 +127,7 @@ def robot_spec(
 
 
 def standing_height(
-    robot: Robot, q: Array, ground: Ground | None = None, swing: Array | None = None
+    robot: Robot, q: Array, ground: Ground | None = None, turns: Array | None = None
 ) -> float:
     """Return the trunk's height above the floor with the lowest foot just on it [m].
 
@@ -137,7 +135,7 @@ def standing_height(
         robot: The robot, level, at the origin.
         q: Joint angles of its legs [rad], (4,) for all or (4, 4) in the order of `LEGS`.
         ground: What lies on the floor; None: nothing.
-        swing: Angles of their motors S [rad], (4,); None: all 0.
+        turns: Angles of the motors of their hips [rad], (4, m); None: all 0.
 
     Raises:
         GeometryError: A foot is not below its hip.
@@ -147,13 +145,11 @@ def standing_height(
     for k, (name, pose) in enumerate(zip(LEGS, poses, strict=True)):
         hip = robot.hips[name]
         height = standing(robot.leg, pose) - hip.pos[2]
-        if swing is not None:
-            foot = in_trunk(hip, kinematics.chain_points(robot.leg, pose).F, swing[k])
-            height = robot.leg.foot_radius - float(foot[2])
+        own = None if turns is None else turns[k]
+        x, y, z = in_trunk(hip, kinematics.chain_points(robot.leg, pose).F, own).tolist()
+        if own is not None and hip.motors:
+            height = robot.leg.foot_radius - z
         if ground is not None and not ground.level:
-            turn = 0.0 if swing is None else swing[k]
-            foot = kinematics.chain_points(robot.leg, pose).F
-            x, y, _ = in_trunk(hip, foot, turn).tolist()
             height += ground.lift(x, y, robot.leg.foot_radius)
         heights.append(height)
     return max(heights)
@@ -224,32 +220,40 @@ def _push(spec: mujoco.MjSpec, pushes: Sequence[Push]) -> None:
             motor.set_to_motor()
 
 
-def _turn(spec: mujoco.MjSpec, hip: Hip, side_step: SideStep, name: str) -> None:
-    """Give a leg its motor S, whose axis is fixed to the trunk, and what turns with the leg."""
-    body = spec.body("trunk").add_body(name=f"{name}_side", pos=hip.axis)
-    body.explicitinertial = True
-    body.mass = side_step.mass
-    body.ipos = (0.0, hip.across, side_step.along)
-    body.inertia = np.full(3, side_step.inertia)
+def _turn(spec: mujoco.MjSpec, hip: Hip, name: str) -> None:
+    """Give a leg the motors of its hip, one on the other, and what turns with each."""
+    carrier = spec.body("trunk")
+    place = hip.axis
+    for motor in hip.motors:
+        body = carrier.add_body(name=f"{name}_{motor.does}", pos=place)
+        carrier = body
+        place = hip.offset(motor)
+        body.explicitinertial = True
+        body.mass = motor.mass
+        body.ipos = place
+        body.inertia = np.full(3, motor.inertia)
 
-    joint = body.add_joint(name=f"{name}_S", type=mujoco.mjtJoint.mjJNT_HINGE, axis=(1.0, 0.0, 0.0))
-    joint.armature = side_step.armature
-    joint.damping[0] = side_step.kd
-    # Of a hinge it is the same as its joint; motors without limits are not among those that keep
-    # theirs (`simulation.clipping`).
-    motor = spec.add_actuator(
-        name=joint.name, trntype=mujoco.mjtTrn.mjTRN_JOINTINPARENT, target=joint.name
-    )
-    motor.set_to_position(kp=side_step.kp)
+        joint = body.add_joint(
+            name=f"{name}_{motor.letter}", type=mujoco.mjtJoint.mjJNT_HINGE, axis=motor.axis
+        )
+        joint.armature = motor.armature
+        joint.damping[0] = motor.kd
+        # Of a hinge it is the same as its joint; motors without limits are not among those that
+        # keep theirs (`simulation.clipping`).
+        drive = spec.add_actuator(
+            name=joint.name, trntype=mujoco.mjtTrn.mjTRN_JOINTINPARENT, target=joint.name
+        )
+        drive.set_to_position(kp=motor.kp)
 
 
 def _attach(spec: mujoco.MjSpec, leg: mujoco.MjSpec, robot: Robot, name: str, scene: Scene) -> None:
     """Fix a leg to the trunk, and measure the floor's force on its foot."""
     hip = robot.hips[name]
-    if hip.side_step is None:
+    if not hip.motors:
         frame = spec.body("trunk").add_frame(pos=hip.pos)
     else:
-        frame = spec.body(f"{name}_side").add_frame(pos=(0.0, hip.across, hip.side_step.along))
+        last = hip.motors[-1]
+        frame = spec.body(f"{name}_{last.does}").add_frame(pos=hip.offset(last))
     if hip.mirrored:
         frame.quat = BACKWARD
     if isinstance(scene, Floor):
@@ -289,7 +293,7 @@ def _rest(
     free = isinstance(scene, Floor)
     trunk = [*spec.body("trunk").pos, 1.0, 0.0, 0.0, 0.0] if free else []
     ctrl = q[[0, 2]] if drive == "position" else np.zeros(2)
-    # The motors S are at 0, and so are their commands.
+    # The motors of hips are at 0, and so are their commands.
     leg = np.concatenate([np.zeros(robot.joints - len(q)), q])
     before = np.zeros(3 * pushes + len(LEGS) * (robot.joints - len(q)))
     spec.add_key(

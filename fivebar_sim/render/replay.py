@@ -13,6 +13,7 @@ from fivebar_sim.errors import RunDirectoryError
 from fivebar_sim.metrics.columns import JOINT_COLUMNS, Record, side_by_side
 from fivebar_sim.robots import LEGS, places
 from fivebar_sim.robots.columns import FORCE_COLUMNS, of_leg, trunk
+from fivebar_sim.robots.hips.motors import column
 from fivebar_sim.robots.measure import Trunk
 from fivebar_sim.robots.scenario import RobotScenario
 from fivebar_sim.scenario import Scenario
@@ -171,7 +172,7 @@ def _of_robot(scenario: RobotScenario, record: Record) -> Replay:
     robot = scenario.robot
     built = model.build_robot(robot, scenario.scene)
     legs = [of_leg(record, name) for name in LEGS]
-    own = JOINT_COLUMNS if robot.side_step is None else (places.SWING, *JOINT_COLUMNS)
+    own = [*(column("theta", motor) for motor in robot.hip_motors), *JOINT_COLUMNS]
     joints = [side_by_side(leg, own) for leg in legs]
     rows = len(record["time"])
     body = trunk(record)

@@ -20,18 +20,30 @@ from fivebar_sim.report.robot_figures import figures, robot_of
 from fivebar_sim.robots import LEGS, Floor
 from fivebar_sim.robots.columns import of_leg, trunk
 from fivebar_sim.robots.floor import load
+from fivebar_sim.robots.hips.motors import MOTORS
 from fivebar_sim.robots.measure import Trunk, heading, lean
 from fivebar_sim.runs.stored import StoredRun
 
 __all__ = ["compared", "figures", "page"]
+
+OF_HIP = (
+    ("rms", ("torque", " RMS"), "load.torque_rms.A"),
+    ("peak", ("torque", " peak"), "load.torque_peak.A"),
+    ("work", ("work given by", ""), "load.work.A.positive"),
+    ("heat", ("heat", ""), "load.heat.A"),
+)
+"""Of each motor of a hip: key behind its name, label around its letter, and the metric as below."""
 
 ROWS = (
     ("torque_rms.A", "torque A RMS", "load.torque_rms.A"),
     ("torque_rms.E", "torque E RMS", "load.torque_rms.E"),
     ("torque_peak.A", "torque A peak", "load.torque_peak.A"),
     ("torque_peak.E", "torque E peak", "load.torque_peak.E"),
-    ("side_rms", "torque S RMS", "load.torque_rms.A"),
-    ("side_peak", "torque S peak", "load.torque_peak.A"),
+    *(
+        (f"{motor.does}_{key}", f"{label[0]} {motor.letter}{label[1]}", unit)
+        for motor in MOTORS
+        for key, label, unit in OF_HIP
+    ),
     ("share_A", "load share A", "load.share_A"),
     ("share_of_robot", "part of all torque", "load.share_A"),
     ("weight_share", "part of the weight", "load.share_A"),

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 from fivebar_sim.arrays import Array
 from fivebar_sim.metrics.columns import COLUMNS, FRICTION_COLUMNS, Record, side_by_side
 from fivebar_sim.robots.floor import Floor, Scene
+from fivebar_sim.robots.hips.motors import QUANTITIES, HipMotor, column
 from fivebar_sim.robots.measure import Trunk
-from fivebar_sim.robots.places import SWING, SWING_RATE
 from fivebar_sim.robots.robot import LEGS
 
 POSITION_COLUMNS = ("trunk_x", "trunk_y", "trunk_z")
@@ -30,23 +30,19 @@ FORCE_COLUMNS = ("ground_x", "ground_y", "ground_z")
 """The floor's force on a foot, along the world's axes [N]."""
 
 
-SIDE_COLUMNS = (SWING, SWING_RATE, "ctrl_S", "torque_S")
-"""Of the motor S of a leg that has one: angle, rate, command [rad] and torque [N m]."""
-
-
-def columns(scene: Scene, *, side_step: bool = False, rubbed: bool = False) -> list[str]:
+def columns(scene: Scene, *, motors: Sequence[HipMotor] = (), rubbed: bool = False) -> list[str]:
     """Return the columns of a robot's record in a scene, in their order.
 
     Args:
         scene: What it stands on.
-        side_step: Whether its legs have a motor S.
+        motors: Those of its hips.
         rubbed: Whether they say what the gears take, see `Servo.records_friction`.
     """
     free = isinstance(scene, Floor)
     own = [
         *COLUMNS[1:],
         *(FRICTION_COLUMNS if rubbed else ()),
-        *(SIDE_COLUMNS if side_step else ()),
+        *(column(quantity, motor) for motor in motors for quantity in QUANTITIES),
         *(FORCE_COLUMNS if free else ()),
     ]
     legs = [f"{leg}_{name}" for leg in LEGS for name in own]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import msgspec
 import numpy as np
 
@@ -9,8 +11,9 @@ from fivebar_sim.checks import check_number
 from fivebar_sim.errors import ArgumentError, unknown
 from fivebar_sim.paths import FootPath
 from fivebar_sim.robots.ahead import Ahead
+from fivebar_sim.robots.hips.motors import HipMotor, SideStep, Steering
+from fivebar_sim.robots.hips.sideways import sided
 from fivebar_sim.robots.robot import LEGS, Robot
-from fivebar_sim.robots.sideways import sided
 
 TROT = {"FL": 0.0, "FR": 0.5, "RL": 0.5, "RR": 0.0}
 """Phases of a trot: the legs of a diagonal together, the two diagonals half a period apart."""
@@ -46,17 +49,21 @@ class Gait(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
             None: 1 for every leg.
         sideways: What the path's x, from the middle of its range, is multiplied by to give the
             foot's way to the left, with the motor S; None: 0 for every leg.
+        steering: Where each leg's motor T turns its plane, and so the foot's way, while the gait
+            begins: an angle to the left [rad]; None: 0 for every leg.
     """
 
     path: FootPath
     phases: dict[str, float]
     strides: dict[str, float] | None = None
     sideways: dict[str, float] | None = None
+    steering: dict[str, float] | None = None
 
     def __post_init__(self) -> None:
         _check_legs("phases", self.phases)
         _check_legs("strides", self.strides or dict.fromkeys(LEGS, 1.0))
         _check_legs("sideways", self.sideways or TOGETHER)
+        _check_legs("steering", self.steering or TOGETHER, "rad", math.pi)
         if self.path.period is None and any(self.phases.values()):
             raise ArgumentError("phases must all be 0: the path does not repeat")
 
@@ -64,6 +71,31 @@ class Gait(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
     def period(self) -> float:
         """Time after which every foot repeats [s]; 0 where none does."""
         return float(self.path.period or 0.0)
+
+    def check_motors(self, robot: Robot) -> None:
+        """Raise unless a robot's hips have the motors that the gait moves, and reach so far.
+
+        Raises:
+            ArgumentError: They don't; names the key.
+        """
+        moved: tuple[tuple[str, type[HipMotor]], ...] = (
+            ("sideways", SideStep),
+            ("steering", Steering),
+        )
+        present = [type(motor) for motor in robot.hip_motors]
+        for key, kind in moved:
+            if any((getattr(self, key) or TOGETHER).values()) and kind not in present:
+                raise ArgumentError(
+                    f"{key} needs a robot with hips.{kind.key}: its legs have no {kind.letter}"
+                )
+
+        for motor in robot.hip_motors:
+            for leg, angle in (self.steering or TOGETHER).items():
+                if isinstance(motor, Steering) and not abs(angle) <= motor.most:
+                    raise ArgumentError(
+                        f"steering.{leg} must be in [{-motor.most:g}, {motor.most:g}] rad, "
+                        f"hips.steering.most, got {angle:g}"
+                    )
 
     def paths(self, robot: Robot) -> dict[str, FootPath]:
         """Return the path of each foot in its own hip frame.
@@ -78,8 +110,7 @@ class Gait(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
 
         strides = self.strides or dict.fromkeys(LEGS, 1.0)
         sideways = self.sideways or TOGETHER
-        if any(sideways.values()) and robot.side_step is None:
-            raise ArgumentError("sideways must all be 0: the robot has no hips.side_step")
+        self.check_motors(robot)
 
         found: dict[str, FootPath] = {}
         for leg in LEGS:
@@ -97,12 +128,12 @@ class Gait(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
         return found
 
 
-def _check_legs(key: str, values: dict[str, float]) -> None:
-    """Raise unless a table has a number for each of the four legs."""
+def _check_legs(key: str, values: dict[str, float], unit: str = "", most: float = 10.0) -> None:
+    """Raise unless a table has a number of at most so much for each of the four legs."""
     for leg in values:
         if leg not in LEGS:
             raise ArgumentError(f"{key}: {unknown('leg', str(leg), LEGS)}")
     for leg in LEGS:
         if leg not in values:
             raise ArgumentError(f"{key}.{leg} is missing")
-        check_number(f"{key}.{leg}", values[leg], "", low=-10.0, high=10.0)
+        check_number(f"{key}.{leg}", values[leg], unit, low=-most, high=most)

@@ -64,6 +64,9 @@ class LegTable(Table, frozen=True):
         saturated: Part of the steps in which the torque limit clipped each motor.
         side_rms: Torque of the motor S, RMS [N m]; unset of legs without one.
         side_peak: Its largest torque [N m]; unset as above.
+        side_work: Work that it gave; what it took back is lost [J]; unset as above.
+        side_heat: Its mean copper heat [W]; unset also where its winding is not known.
+        steer_rms, steer_peak, steer_work, steer_heat: The same of the motor T.
         heat: Mean copper heat of each motor [W]; unset where the winding is not known.
         duty: Part of the time in which the foot stands; unset in the air, as is all below.
         slip: Distance that the foot slid while it stood [m].
@@ -79,6 +82,12 @@ class LegTable(Table, frozen=True):
     saturated: Parts
     side_rms: Amount | msgspec.UnsetType = msgspec.UNSET
     side_peak: Amount | msgspec.UnsetType = msgspec.UNSET
+    side_work: Amount | msgspec.UnsetType = msgspec.UNSET
+    side_heat: Amount | msgspec.UnsetType = msgspec.UNSET
+    steer_rms: Amount | msgspec.UnsetType = msgspec.UNSET
+    steer_peak: Amount | msgspec.UnsetType = msgspec.UNSET
+    steer_work: Amount | msgspec.UnsetType = msgspec.UNSET
+    steer_heat: Amount | msgspec.UnsetType = msgspec.UNSET
     heat: Motors | msgspec.UnsetType = msgspec.UNSET
     duty: Part | msgspec.UnsetType = msgspec.UNSET
     slip: Amount | msgspec.UnsetType = msgspec.UNSET

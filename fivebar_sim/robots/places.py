@@ -5,20 +5,15 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from fivebar_sim import kinematics
 from fivebar_sim.arrays import Array
 from fivebar_sim.metrics.columns import JOINT_COLUMNS, side_by_side
 from fivebar_sim.robots.ground import Ground
+from fivebar_sim.robots.hips.hip import Hip
+from fivebar_sim.robots.hips.turned import angles, in_trunk, plane_normal, turning
 from fivebar_sim.robots.measure import Trunk
-from fivebar_sim.robots.robot import Hip, Robot
-
-SWING = "theta_S"
-"""The column of the motor S of a leg that has one [rad]."""
-
-SWING_RATE = "theta_dot_S"
-"""Its rate [rad/s]."""
+from fivebar_sim.robots.robot import Robot
 
 
 def rotation(quaternion: Array) -> Array:
@@ -35,34 +30,12 @@ def rotation(quaternion: Array) -> Array:
     return np.moveaxis(np.array(rows), -1, 0)
 
 
-def in_trunk(hip: Hip, points: Array, swing: ArrayLike = 0.0) -> Array:
-    """Return points (x, z) of a leg's hip frame in the trunk's frame [m], (..., 2) to (..., 3).
-
-    Args:
-        hip: Where the leg is.
-        points: The points [m].
-        swing: Angle of the motor S [rad], (...).
-    """
-    sign = -1.0 if hip.mirrored else 1.0
-    x = sign * points[..., 0]
-    if hip.side_step is None:
-        zero = np.zeros_like(x)
-        return np.array(hip.pos) + np.stack([x, zero, points[..., 1]], axis=-1)
-
-    cos = np.cos(swing)
-    sin = np.sin(swing)
-    out = hip.across
-    up = hip.side_step.along + points[..., 1]
-    turned = np.stack([x, out * cos - up * sin, out * sin + up * cos], axis=-1)
-    return np.array(hip.axis) + turned
-
-
-def in_world(trunk: Trunk, hip: Hip, points: Array, swing: ArrayLike = 0.0) -> Array:
+def in_world(trunk: Trunk, hip: Hip, points: Array, turns: Array) -> Array:
     """Return points (x, z) of a leg's hip frame in the world after each step [m], (N, 3).
 
     Arguments besides the trunk are those of `in_trunk`.
     """
-    inside = in_trunk(hip, points, swing)
+    inside = in_trunk(hip, points, turns)
     turned = np.einsum("nij,nj->ni", rotation(trunk.quaternion), inside)
     return trunk.position + turned
 
@@ -76,7 +49,7 @@ def feet(trunk: Trunk, hip: Hip, record: Mapping[str, Array]) -> Array:
         record: The leg's columns, without its name in front.
     """
     foot = side_by_side(record, ("foot_x", "foot_z"))
-    return in_world(trunk, hip, foot, record.get(SWING, 0.0))
+    return in_world(trunk, hip, foot, angles(hip, record))
 
 
 def slid(
@@ -108,12 +81,12 @@ def slid(
     sign = 1.0 if hip.mirrored else -1.0
     rate = sign * (record["theta_dot_A"] + record["theta_dot_B"])[:, None]
     turns = np.einsum("nij,nj->ni", axes, trunk.turning)
-    if hip.side_step is None:
+    if not hip.motors:
         turns = turns + rate * axes[:, :, 1]
     else:
-        swing = record[SWING][:, None]
-        across = np.cos(swing) * axes[:, :, 1] + np.sin(swing) * axes[:, :, 2]
-        turns = turns + rate * across + record[SWING_RATE][:, None] * axes[:, :, 0]
+        own = angles(hip, record)
+        inside = rate * plane_normal(hip, own) + turning(hip, own, angles(hip, record, "theta_dot"))
+        turns = turns + np.einsum("nij,nj->ni", axes, inside)
     r = robot.leg.foot_radius
     if ground is not None and not ground.level:
         place = feet(trunk, hip, record)
@@ -142,8 +115,8 @@ def depths(robot: Robot, trunk: Trunk, hip: Hip, record: Mapping[str, Array]) ->
     joints = {"A": A, "B": points.B, "D": points.D, "E": E}
     if leg.L6 > max(leg.foot_radius - leg.radius, 0.0):
         joints["C"] = points.C_left
-    swing = record.get(SWING, 0.0)
-    heights = {name: in_world(trunk, hip, place, swing)[:, 2] for name, place in joints.items()}
+    own = angles(hip, record)
+    heights = {name: in_world(trunk, hip, place, own)[:, 2] for name, place in joints.items()}
     return {
         f"joint {name}": np.maximum(leg.radius - height, 0.0) for name, height in heights.items()
     }

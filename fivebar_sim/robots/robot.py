@@ -21,15 +21,18 @@ from fivebar_sim.errors import ArgumentError, ConfigError
 from fivebar_sim.files import presets, tables
 from fivebar_sim.files.tables import Table
 from fivebar_sim.geometry import HEAVIEST, LONGEST, FiveBar
+from fivebar_sim.robots.hips.hip import Hip
+from fivebar_sim.robots.hips.motors import MOTORS, HipMotor, Vector
 from fivebar_sim.scenario import reading
 
 LEGS = ("FL", "FR", "RL", "RR")
 """The legs, in the order of a robot's joints and motors: front left, front right, rear left, rear
 right."""
 
-KEYS = ("name", "leg", "servo", "mass", "trunk", "hips")
+SERVO_ONLY = ("servo", "limit", "speed", "friction", "rate", "delay", "resolution")
+"""What the servos at A and E may have, and the motors of hips do not."""
 
-Vector = tuple[float, float, float]
+KEYS = ("name", "leg", "servo", "mass", "trunk", "hips")
 
 
 class Trunk(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -76,80 +79,6 @@ class Trunk(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
         length, width, height = (side**2 for side in self.size)
         part = mass / 12.0
         return part * (width + height), part * (length + height), part * (length + width)
-
-
-class SideStep(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """A fifth motor of every leg, S, which turns the leg's plane about an axis along the trunk's x.
-
-    It is an ideal position servo: its torque is kp (u - theta_S) - kd theta_dot_S, without limit,
-    delay or friction. theta_S turns from +y to +z: a positive one swings a hanging foot to the
-    left. See `kinematics.hip.SideStep`.
-
-    Attributes:
-        kp: Gain on the angle [N m/rad].
-        kd: Gain on the rate [N m s/rad].
-        mass: What turns with the leg's plane besides the leg: the motors A and E [kg].
-        radius: Of the ball that stands for it, in the middle between A and E [m].
-        armature: The motor's rotor inertia [kg m^2].
-        across: How far outside of the axis the leg's plane is [m].
-        along: Height of the middle between A and E above the axis [m].
-        most: Largest angle to either side [rad].
-    """
-
-    kp: float
-    kd: float
-    mass: float
-    radius: float = 0.01
-    armature: float = 1e-5
-    across: float = 0.0
-    along: float = 0.0
-    most: float = math.pi / 4.0
-
-    def __post_init__(self) -> None:
-        check_number("kp", self.kp, "N m/rad", low=0.0, high=1e6, strict=True)
-        check_number("kd", self.kd, "N m s/rad", low=0.0, high=1e6)
-        check_number("mass", self.mass, "kg", low=1e-6, high=HEAVIEST)
-        check_number("radius", self.radius, "m", low=1e-4, high=LONGEST)
-        check_number("armature", self.armature, "kg m^2", low=0.0, high=HEAVIEST)
-        check_number("across", self.across, "m", low=-LONGEST, high=LONGEST)
-        check_number("along", self.along, "m", low=-LONGEST, high=LONGEST)
-        check_number("most", self.most, "rad", low=0.0, high=0.5 * math.pi, strict=True)
-
-    @property
-    def inertia(self) -> float:
-        """Moment of inertia of the ball about its middle, 2/5 m r^2 [kg m^2]."""
-        return 0.4 * self.mass * self.radius**2
-
-
-class Hip(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """Where a leg is fixed to the trunk.
-
-    Attributes:
-        pos: Origin of the leg's hip frame, midway between A and E, in the trunk's frame [m].
-        mirrored: Whether the leg is turned by half a turn about z: its x points backward.
-        side_step: The motor S between trunk and leg; None: there is none.
-    """
-
-    pos: Vector
-    mirrored: bool = False
-    side_step: SideStep | None = None
-
-    def __post_init__(self) -> None:
-        for value in self.pos:
-            check_number("pos", value, "m", low=-LONGEST, high=LONGEST)
-
-    @property
-    def across(self) -> float:
-        """Y of the leg's plane from the axis of S [m]: outward is to the left of left legs."""
-        outward = 0.0 if self.side_step is None else self.side_step.across
-        return math.copysign(1.0, self.pos[1]) * outward
-
-    @property
-    def axis(self) -> Vector:
-        """Where the axis of S is, in the trunk's frame [m]."""
-        along = 0.0 if self.side_step is None else self.side_step.along
-        x, y, z = self.pos
-        return x, y - self.across, z - along
 
 
 class Robot(msgspec.Struct, frozen=True, kw_only=True):
@@ -199,18 +128,18 @@ class Robot(msgspec.Struct, frozen=True, kw_only=True):
     @property
     def trunk_mass(self) -> float:
         """The mass of the trunk: what the legs leave [kg]."""
-        own = 0.0 if self.side_step is None else self.side_step.mass
+        own = sum(motor.mass for motor in self.hip_motors)
         return self.mass - 4.0 * (sum(link.mass for link in self.leg.links) + own)
 
     @property
-    def side_step(self) -> SideStep | None:
-        """The motor S of every leg; None: there are none."""
-        return self.hips[LEGS[0]].side_step
+    def hip_motors(self) -> tuple[HipMotor, ...]:
+        """The motors of every hip that there are, from the trunk to the leg: T, S, both or none."""
+        return self.hips[LEGS[0]].motors
 
     @property
     def joints(self) -> int:
-        """How many joints a leg has: (S,) A, B, E and D."""
-        return 4 if self.side_step is None else 5
+        """How many joints a leg has: those of its hip, then A, B, E and D."""
+        return 4 + len(self.hip_motors)
 
     @property
     def length(self) -> float:
@@ -263,9 +192,11 @@ class Robot(msgspec.Struct, frozen=True, kw_only=True):
         """Return the robot as a TOML table, leg and servo spelt out."""
         trunk = msgspec.to_builtins(self.trunk)
         hips = {name: msgspec.to_builtins(hip) for name, hip in self.hips.items()}
-        side_step = {leg: hips[leg].pop("side_step") for leg in LEGS}[LEGS[0]]
-        if side_step is not None:
-            hips["side_step"] = side_step
+        for motor in MOTORS:
+            own = [hips[leg].pop(motor.key) for leg in LEGS]
+            # All legs have the same.
+            if own[0] is not None:
+                hips[motor.key] = _present(own[0])
         return {
             "name": self.name,
             "leg": _present(asdict(self.leg)),
@@ -288,20 +219,37 @@ def _printable(name: Any, where: str) -> str:
 
 
 def _hips(table: Any, where: str) -> dict[str, Hip]:
-    """Return the four hips of a table [hips], all with the same motor S if it has one."""
+    """Return the four hips of a table [hips], all with the same motors if they have any."""
     if not isinstance(table, dict):
         raise ConfigError(f"{where}: hips must be a table, got {table!r}")
-    tables.check_keys(table, (*LEGS, "side_step"), f"{where}: [hips]")
-    side_step = None
-    if "side_step" in table:
-        side_step = tables.convert(table["side_step"], SideStep, "hips.side_step", where)
+    keys = [motor.key for motor in MOTORS]
+    tables.check_keys(table, (*LEGS, *keys), f"{where}: [hips]")
+    motors = {
+        motor.key: _hip_motor(table[motor.key], motor, where)
+        for motor in MOTORS
+        if motor.key in table
+    }
     for leg in LEGS:
         if leg not in table:
             raise ConfigError(f"{where}: hips.{leg} is missing")
+
     hips: dict[str, Hip] = {}
     for leg in LEGS:
-        if isinstance(table[leg], dict) and "side_step" in table[leg]:
-            raise ConfigError(f"{where}: hips.side_step is that of all legs, not hips.{leg}'s own")
+        for key in keys:
+            if isinstance(table[leg], dict) and key in table[leg]:
+                raise ConfigError(f"{where}: hips.{key} is that of all legs, not hips.{leg}'s own")
         hip = tables.convert(table[leg], Hip, f"hips.{leg}", where)
-        hips[leg] = msgspec.structs.replace(hip, side_step=side_step)
+        hips[leg] = msgspec.structs.replace(hip, **motors)
     return hips
+
+
+def _hip_motor(table: Any, kind: type[HipMotor], where: str) -> HipMotor:
+    """Return the motor of all hips of a table."""
+    name = f"hips.{kind.key}"
+    for key in SERVO_ONLY:
+        if isinstance(table, dict) and key in table:
+            raise ConfigError(
+                f"{where}: {name}.{key} is not known: {kind.letter} is an ideal position servo "
+                "with kp and kd, without limit, delay or friction"
+            )
+    return tables.convert(table, kind, name, where)

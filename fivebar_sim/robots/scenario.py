@@ -11,7 +11,7 @@ import msgspec
 from fivebar_sim import units
 from fivebar_sim.control.sensors import Sensors
 from fivebar_sim.errors import ArgumentError, ConfigError, unknown
-from fivebar_sim.files import presets, tables
+from fivebar_sim.files import presets, quantities, tables
 from fivebar_sim.files.tables import Table
 from fivebar_sim.metrics.catalogue import (
     GROUND_KEYS,
@@ -23,7 +23,7 @@ from fivebar_sim.metrics.catalogue import (
 from fivebar_sim.metrics.guards import Guards
 from fivebar_sim.robots.floor import KINDS, Air, Floor, Payload
 from fivebar_sim.robots.floor import Scene as Stage
-from fivebar_sim.robots.gait import PHASES, TOGETHER, Gait
+from fivebar_sim.robots.gait import PHASES, Gait
 from fivebar_sim.robots.ground import KINDS as GROUNDS
 from fivebar_sim.robots.ground import Ground
 from fivebar_sim.robots.push import Push
@@ -51,6 +51,7 @@ class RobotScenario(Scenario, frozen=True, kw_only=True):
         phases: By what part of a period each leg is ahead of the path.
         strides: What the path's x is multiplied by for each leg; None: 1 for every leg.
         sideways: What it is multiplied by for each foot's way to the left; None: 0 for every leg.
+        steering: Where each leg is steered, to the left [rad]; None: 0 for every leg.
         scene: What the robot stands on.
         pushes: Forces on its trunk.
     """
@@ -59,6 +60,7 @@ class RobotScenario(Scenario, frozen=True, kw_only=True):
     phases: dict[str, float]
     strides: dict[str, float] | None = None
     sideways: dict[str, float] | None = None
+    steering: dict[str, float] | None = None
     scene: Stage = Floor()
     pushes: tuple[Push, ...] = ()
     known_limits: ClassVar[tuple[str, ...]] = ROBOT_KEYS
@@ -76,7 +78,11 @@ class RobotScenario(Scenario, frozen=True, kw_only=True):
     def gait(self) -> Gait:
         """What the feet do."""
         return Gait(
-            path=self.path, phases=self.phases, strides=self.strides, sideways=self.sideways
+            path=self.path,
+            phases=self.phases,
+            strides=self.strides,
+            sideways=self.sideways,
+            steering=self.steering,
         )
 
     @classmethod
@@ -92,8 +98,6 @@ class RobotScenario(Scenario, frozen=True, kw_only=True):
         controller_name, controller = reading.controller(table.get("controller", {}), where)
         robot = read_robot(table["robot"], where, folder)
         path = reading.path(table.get("path"), where, folder)
-        gait = table.get("gait", {})
-        phases, strides, sideways = _gait(gait, where)
         scene = _scene(table.get("scene", "floor"), where)
 
         parts = {
@@ -102,9 +106,7 @@ class RobotScenario(Scenario, frozen=True, kw_only=True):
             "leg": robot.leg,
             "servo": robot.servo,
             "path": path,
-            "phases": phases,
-            "strides": strides,
-            "sideways": sideways,
+            **_gait(table.get("gait", {}), where),
             "controller": controller,
             "controller_name": controller_name,
             "scene": scene,
@@ -129,8 +131,8 @@ class RobotScenario(Scenario, frozen=True, kw_only=True):
             table.pop(key)
         changed = msgspec.structs.replace(self.robot, servo=self.servo)
         gait = {"phases": self.phases, "strides": self.strides or dict.fromkeys(LEGS, 1.0)}
-        if self.sideways and any(self.sideways.values()):
-            gait["sideways"] = self.sideways
+        moved = {"sideways": self.sideways, "steering": self.steering}
+        gait |= {key: legs for key, legs in moved.items() if legs and any(legs.values())}
         own = {"name": table.pop("name"), "robot": changed.table(), "gait": gait, **table}
         if self.pushes:
             own["push"] = [msgspec.to_builtins(push) for push in self.pushes]
@@ -181,26 +183,28 @@ def _merge(table: Table, own: Table) -> None:
             table[key] = value
 
 
-def _gait(
-    table: Any, where: str
-) -> tuple[dict[str, float], dict[str, float], dict[str, float] | None]:
-    """Return phases, strides and ways to the side of the table [gait]."""
+def _gait(table: Any, where: str) -> dict[str, dict[str, float] | None]:
+    """Return phases, strides, ways to the side and steering of the table [gait]."""
     if not isinstance(table, dict):
         raise ConfigError(f"{where}: gait must be a table, got {table!r}")
-    tables.check_keys(table, ("phases", "strides", "sideways"), f"{where}: [gait]")
+    tables.check_keys(table, ("phases", "strides", "sideways", "steering"), f"{where}: [gait]")
     phases = table.get("phases", "together")
     if isinstance(phases, str):
         if phases not in PHASES:
             raise ConfigError(f"{where}: gait.phases: {unknown('gait', phases, PHASES)}")
         phases = PHASES[phases]
 
-    strides = table.get("strides", dict.fromkeys(LEGS, 1.0))
-    sideways = table.get("sideways")
-    given = {"phases": phases, "strides": strides, "sideways": sideways or TOGETHER}
+    given = {"strides": dict.fromkeys(LEGS, 1.0), **table, "phases": phases}
     for key, value in given.items():
         if not isinstance(value, dict):
             raise ConfigError(f"{where}: gait.{key} must be a table of the legs, got {value!r}")
-    return dict(phases), dict(strides), None if sideways is None else dict(sideways)
+    found: dict[str, dict[str, float] | None] = {key: dict(legs) for key, legs in given.items()}
+    if "steering" in given:
+        found["steering"] = {
+            leg: quantities.quantity(angle, "rad", f"{where}: gait.steering.{leg}")
+            for leg, angle in given["steering"].items()
+        }
+    return found
 
 
 def _scene(value: Any, where: str) -> Stage:
@@ -260,32 +264,30 @@ def _check_pushes(scenario: RobotScenario, *, held: bool) -> None:
 
 
 def _check_friction(scenario: RobotScenario) -> None:
-    """Raise where what passes through the gears is not known: off level floors, beside motors S."""
+    """Raise where what passes through gears is not known: off level floors, beside S and T."""
     if not scenario.servo.records_friction:
         return
 
     where = ""
-    if scenario.robot.side_step is not None:
-        where = "with hips.side_step"
+    if scenario.robot.hip_motors:
+        where = f"with hips.{scenario.robot.hip_motors[0].key}"
     elif isinstance(scenario.scene, Floor) and not scenario.scene.ground.level:
         where = "on uneven ground"
 
     if where:
         raise ConfigError(
             f"servo.friction of a robot {where} must be a number [N m]: how friction changes with "
-            "speed and load is known of legs without a motor S, in the air or on a flat floor"
+            "speed and load is known of legs without motors S and T, in the air or on a flat floor"
         )
 
 
 def _check_together(scenario: RobotScenario) -> None:
     """Raise unless the tables of a scenario, each legal by itself, fit together."""
     try:
-        scenario.gait  # noqa: B018 made for its checks
+        scenario.gait.check_motors(scenario.robot)
     except ArgumentError as error:
         raise ConfigError(f"gait.{error}") from None
 
-    if any((scenario.sideways or TOGETHER).values()) and scenario.robot.side_step is None:
-        raise ConfigError("gait.sideways needs a robot with hips.side_step: its legs have no S")
     check_window(scenario)
     _check_friction(scenario)
     held = isinstance(scenario.scene, Air)

@@ -167,9 +167,9 @@ def _check_plausible(file: Path, record: Record, timestep: float) -> None:
 def _common_columns(scenario: Scenario) -> list[str]:
     """Return the columns that every record of a leg has, or all of a robot's."""
     if isinstance(scenario, RobotScenario):
-        sided = scenario.robot.side_step is not None
+        motors = scenario.robot.hip_motors
         rubbed = scenario.servo.records_friction
-        return robots_columns(scenario.scene, side_step=sided, rubbed=rubbed)
+        return robots_columns(scenario.scene, motors=motors, rubbed=rubbed)
     return list(COLUMNS)
 
 

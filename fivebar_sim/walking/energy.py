@@ -16,6 +16,7 @@ from fivebar_sim.metrics.energy import STILL, Balance
 from fivebar_sim.robots import LEGS, Floor
 from fivebar_sim.robots.columns import FORCE_COLUMNS, of_leg
 from fivebar_sim.robots.floor import load
+from fivebar_sim.robots.hips.motors import column
 from fivebar_sim.walking.walk import Walk, before, wrench
 
 
@@ -36,10 +37,10 @@ def balance(went: Walk) -> Balance:
     own = _motors(planned.model)
     turning = w[:, own]
     motor = np.sum(torque * turning, axis=1)
-    if planned.robot.side_step is not None:
-        sides = [planned.robot.joints * (k - len(LEGS)) for k in range(len(LEGS))]
-        swung = np.stack([went.record[f"{leg}_torque_S"] for leg in LEGS], axis=1)
-        motor += np.sum(swung * w[:, sides], axis=1)
+    for i, each in enumerate(planned.robot.hip_motors):
+        hips = [planned.robot.joints * (k - len(LEGS)) + i for k in range(len(LEGS))]
+        turned = [went.record[f"{leg}_{column('torque', each)}"] for leg in LEGS]
+        motor += np.sum(np.stack(turned, axis=1) * w[:, hips], axis=1)
 
     # MuJoCo counts the gears' viscous friction as damping, which a motor has too.
     constraint = went.states.constraint[0].copy()

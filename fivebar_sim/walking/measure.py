@@ -17,7 +17,7 @@ from fivebar_sim.metrics.measured import Measured
 from fivebar_sim.metrics.sharing import Load
 from fivebar_sim.robots import LEGS, Floor, places, together
 from fivebar_sim.robots import measured as robots
-from fivebar_sim.robots.columns import SIDE_COLUMNS, of_leg
+from fivebar_sim.robots.columns import of_leg
 from fivebar_sim.robots.floor import load
 from fivebar_sim.robots.ground import Flat
 from fivebar_sim.robots.measure import measure as how_it_moved
@@ -27,10 +27,8 @@ from fivebar_sim.simulation import record as recorded
 from fivebar_sim.simulation.measure import Unrecorded, heating_of, load_of
 from fivebar_sim.walking import energy as whole_energy
 from fivebar_sim.walking.guards import Seen, judge
+from fivebar_sim.walking.hip_load import HipLoad, all_heat, hip_loads
 from fivebar_sim.walking.walk import Walk, jumped, saturated
-
-SIDE_TORQUE = SIDE_COLUMNS[-1]
-"""The column of the motor S's torque."""
 
 NOWHERE = 0.01
 """Body lengths below which a way is none: a cost of transport over it would mean nothing."""
@@ -101,7 +99,9 @@ def measure(went: Walk) -> Measured:
         warnings=int(went.states.warnings[0]),
         ground=ground,
     )
-    return robots.of(common, _robot(went, legs), LegsTable(**_legs(legs, window)))
+    hips = hip_loads(planned, went.record)
+    own = LegsTable(**_legs(legs, hips, window))
+    return robots.of(common, _robot(went, legs, hips), own)
 
 
 def _leg(went: Walk, k: int) -> Leg:
@@ -204,7 +204,9 @@ def _with_forces(found: Any, went: Walk, legs: list[Leg], rows: slice) -> Any:
     return msgspec.structs.replace(with_force, at=at)
 
 
-def _robot(went: Walk, legs: list[Leg]) -> RobotTable | msgspec.UnsetType:
+def _robot(
+    went: Walk, legs: list[Leg], hips: dict[str, list[HipLoad]]
+) -> RobotTable | msgspec.UnsetType:
     """Return how the trunk moved; unset where it was held."""
     if went.trunk is None:
         return msgspec.UNSET
@@ -220,9 +222,13 @@ def _robot(went: Walk, legs: list[Leg]) -> RobotTable | msgspec.UnsetType:
     if way > NOWHERE * robot.length and weight > 0.0:
         works = [leg.load.work for leg in legs]
         given = sum((work.A.positive or 0.0) + (work.E.positive or 0.0) for work in works)
+        given += sum(hip_load.work for each in hips.values() for hip_load in each)
         cost = given / (weight * way)
-        if all(leg.heated is not None for leg in legs):
-            watts = sum(float(leg.heated.watts.sum()) for leg in legs if leg.heated is not None)
+        warm = all_heat(hips)
+        if warm is not None and all(leg.heated is not None for leg in legs):
+            watts = warm + sum(
+                float(leg.heated.watts.sum()) for leg in legs if leg.heated is not None
+            )
             electric = (given + watts * seconds) / (weight * way)
 
     table = RobotTable(
@@ -243,7 +249,7 @@ def _robot(went: Walk, legs: list[Leg]) -> RobotTable | msgspec.UnsetType:
     return msgspec.structs.replace(table, jump_height=height, agility=agility)
 
 
-def _legs(legs: list[Leg], window: slice) -> dict[str, LegTable]:
+def _legs(legs: list[Leg], hips: dict[str, list[HipLoad]], window: slice) -> dict[str, LegTable]:
     """Return what each leg did over the window."""
     efforts = [float(np.abs(motors(leg.record, "torque")[window]).sum()) for leg in legs]
     weights = [0.0 if leg.force is None else float(leg.force[window].sum()) for leg in legs]
@@ -253,10 +259,8 @@ def _legs(legs: list[Leg], window: slice) -> dict[str, LegTable]:
         error = tracking.tracking_error(leg.record)[window]
         besides: dict[str, Any] = {}
 
-        if SIDE_TORQUE in leg.record:
-            swung = leg.record[SIDE_TORQUE][window]
-            besides["side_rms"] = tracking.root_mean_square(swung)
-            besides["side_peak"] = float(np.abs(swung).max())
+        for hip_load in hips[leg.name]:
+            besides |= hip_load.table
 
         if leg.force is not None and leg.slid is not None:
             besides |= {

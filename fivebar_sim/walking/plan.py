@@ -19,9 +19,10 @@ from fivebar_sim.model.robot import standing_height
 from fivebar_sim.motion import Motion
 from fivebar_sim.paths import FootPath
 from fivebar_sim.robots import LEGS, Floor, Gait, Robot, Scene
+from fivebar_sim.robots.gait import TOGETHER
+from fivebar_sim.robots.hips.swings import swings
 from fivebar_sim.robots.push import Push, forces
 from fivebar_sim.robots.scenario import RobotScenario
-from fivebar_sim.robots.sideways import Sideways
 from fivebar_sim.scenario import Scenario
 from fivebar_sim.simulation.plan import Plan, asked_setpoints, check_period, sent_setpoints
 
@@ -38,7 +39,7 @@ class RobotPlan(NamedTuple):
         setpoints: What reaches the motors in every step [rad], (N, 8); None where a feedback
             controller decides during the run.
         pushes: Forces on the trunk in every step [N], (N, 3) for each push.
-        swings: Commands of the motors S [rad], (N, 4); (N, 0) of a robot without.
+        swings: Commands of the motors of hips [rad], (N, 4, m), m of each leg, see `Hip.motors`.
     """
 
     scenario: RobotScenario
@@ -52,7 +53,8 @@ class RobotPlan(NamedTuple):
     @property
     def besides(self) -> Array:
         """What ctrl begins with, before the commands of A and E, in every step, (N, n)."""
-        return np.concatenate([self.pushes, self.swings], axis=1)
+        turns = self.swings.reshape(len(self.swings), -1)
+        return np.concatenate([self.pushes, turns], axis=1)
 
     @property
     def robot(self) -> Robot:
@@ -123,6 +125,7 @@ def plan(
             phases=gait.phases,
             strides=gait.strides,
             sideways=gait.sideways,
+            steering=gait.steering,
             controller=law,
             controller_name=name_of(law),
             scene=Floor() if scene is None else scene,
@@ -148,43 +151,18 @@ def plan_scenario(scenario: RobotScenario) -> RobotPlan:
     )
     paths = scenario.gait.paths(robot)
     legs = tuple(_of_leg(scenario, paths[leg], leg, built) for leg in LEGS)
-    swing = _swings(scenario, [paths[leg] for leg in LEGS])
+    time = sim.timestep * np.arange(scenario.steps + 1, dtype=np.float64)
+    turns = swings(robot, paths, scenario.steering or TOGETHER, time)
     poses = np.stack([leg.start for leg in legs])
-    start = np.concatenate([swing[0].reshape(len(LEGS), -1), poses], axis=1).ravel()
+    start = np.concatenate([turns[0], poses], axis=1).ravel()
     if isinstance(scenario.scene, Floor):
-        turned = swing[0] if swing.size else None
-        height = standing_height(robot, poses, scenario.scene.ground, turned)
+        height = standing_height(robot, poses, scenario.scene.ground, turns[0])
         start = np.concatenate([[0.0, 0.0, height, 1.0, 0.0, 0.0, 0.0], start])
 
     sent = [leg.setpoints for leg in legs if leg.setpoints is not None]
     table = np.concatenate(sent, axis=1) if sent else None
     pushed = forces(scenario.pushes, scenario.steps, sim.timestep)
-    return RobotPlan(scenario, legs, built, start, table, pushed, swing[1:])
-
-
-def _swings(scenario: RobotScenario, paths: Sequence[FootPath]) -> Array:
-    """Return the angles of the motors S at the start and after each step [rad], (N + 1, 4).
-
-    (N + 1, 0) of a robot without.
-
-    Raises:
-        ConfigError: One would turn too far; says which leg's, when and by how much.
-    """
-    time = scenario.sim.timestep * np.arange(scenario.steps + 1, dtype=np.float64)
-    sided = [path for path in paths if isinstance(path, Sideways)]
-    side_step = scenario.robot.side_step
-    if side_step is None or not sided:
-        return np.empty((len(time), 0))
-
-    swing = np.stack([path.swing(time) for path in sided], axis=-1)
-    far = np.abs(swing) > side_step.most
-    if far.any():
-        k, leg = (int(i) for i in np.argwhere(far)[0])
-        raise ConfigError(
-            f"{LEGS[leg]}: theta_S must be in [{-side_step.most:g}, {side_step.most:g}] rad, "
-            f"hips.side_step.most, got {swing[k, leg]:g} rad at t = {time[k]:g} s"
-        )
-    return swing
+    return RobotPlan(scenario, legs, built, start, table, pushed, turns[1:])
 
 
 def _of_leg(scenario: RobotScenario, path: FootPath, leg: str, built: mujoco.MjModel) -> Plan:

@@ -23,8 +23,9 @@ from fivebar_sim.recording.plots import Series
 from fivebar_sim.recording.poses import Room, Rows, drawn_motion, drawn_rows
 from fivebar_sim.recording.summary import summary
 from fivebar_sim.render import palette
-from fivebar_sim.robots import LEGS, Floor, Hip, Robot, places
+from fivebar_sim.robots import LEGS, Floor, Robot, places
 from fivebar_sim.robots.columns import of_leg, trunk
+from fivebar_sim.robots.hips import turned
 from fivebar_sim.robots.measure import Trunk, heading, lean
 from fivebar_sim.robots.scenario import RobotScenario
 from fivebar_sim.scenario.run import Run
@@ -110,8 +111,8 @@ def _send_run(stream: rr.RecordingStream, run: Run, look: Look, room: Room) -> N
     stream.log(f"{look.root}{TRUNK}", box, static=True)
     body = trunk(run.record)
     if body is not None:
-        turned = body.quaternion[rows][:, [1, 2, 3, 0]]
-        poses = rr.Transform3D.columns(translation=body.position[rows], quaternion=turned)
+        facing = body.quaternion[rows][:, [1, 2, 3, 0]]
+        poses = rr.Transform3D.columns(translation=body.position[rows], quaternion=facing)
         stream.send_columns(f"{look.root}{TRUNK}", drawn, poses)
     for name in LEGS:
         _send_leg(stream, run, name, look, drawn, rows)
@@ -138,12 +139,14 @@ def _send_leg(
         quaternion=rr.Quaternion(xyzw=TURNED if hip.mirrored else (0.0, 0.0, 0.0, 1.0)),
     )
     record = of_leg(run.record, name)
-    if hip.side_step is None:
+    if not hip.motors:
         stream.log(root, fixed, static=True)
     else:
-        swing = record[places.SWING][rows]
-        origin = places.in_trunk(hip, np.zeros((len(swing), 2)), swing)
-        frames = rr.Transform3D.columns(translation=origin, quaternion=swung(hip, swing))
+        turns = turned.angles(hip, record)[rows]
+        origin = turned.in_trunk(hip, np.zeros((len(turns), 2)), turns)
+        frames = rr.Transform3D.columns(
+            translation=origin, quaternion=turned.quaternion(hip, turns)[:, [1, 2, 3, 0]]
+        )
         stream.send_columns(root, drawn, frames)
     # Without the ground: the hip hangs on the trunk, not on a rail.
     moved = drawn_motion(_in_air(record), rows)
@@ -156,24 +159,6 @@ def _send_leg(
         colors=[look.colour(shade("target"))],
     )
     stream.log(f"{root}/{foot.TARGET_PATH}", path, static=True)
-
-
-def swung(hip: Hip, swing: Array) -> Array:
-    """Return how a leg's hip frame is turned in the trunk's by its motor S, (N, 4).
-
-    Args:
-        hip: The hip.
-        swing: Angle of S [rad], (N,).
-
-    Returns:
-        Quaternions (x, y, z, w).
-    """
-    half = 0.5 * swing
-    still = np.zeros_like(half)
-    # Turned about x; of a mirrored leg after half a turn about z.
-    turned = [still, -np.sin(half), np.cos(half), still]
-    straight = [np.sin(half), still, still, np.cos(half)]
-    return np.stack(turned if hip.mirrored else straight, axis=-1)
 
 
 def _in_air(record: Record) -> Record:

@@ -70,8 +70,8 @@ class WalkTask(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=
     timestep: float = 0.001
 
     def __post_init__(self) -> None:
-        if self.robot.side_step is not None:
-            raise ArgumentError("robot must have eight motors: hips.side_step is not known here")
+        for motor in self.robot.hip_motors:
+            raise ArgumentError(f"robot must have eight motors: hips.{motor.key} is not known here")
         for name in ("speed", "turn"):
             low, high = _pair(name, getattr(self, name))
             check_number(f"{name}[0]", low, "", low=-FASTEST, high=FASTEST)

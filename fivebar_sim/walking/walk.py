@@ -13,7 +13,8 @@ from fivebar_sim.errors import DivergedError
 from fivebar_sim.metrics.columns import Record
 from fivebar_sim.model.feet import POSE, Hips, walking
 from fivebar_sim.robots import LEGS, Floor
-from fivebar_sim.robots.columns import FORCE_COLUMNS, SIDE_COLUMNS, TRUNK_COLUMNS, trunk
+from fivebar_sim.robots.columns import FORCE_COLUMNS, TRUNK_COLUMNS, trunk
+from fivebar_sim.robots.hips.motors import QUANTITIES, column
 from fivebar_sim.robots.jump import Jump, jump
 from fivebar_sim.robots.measure import Fall, Trunk, falls
 from fivebar_sim.simulation import record as recorded
@@ -134,8 +135,8 @@ def _leg(planned: RobotPlan, states: States, k: int) -> Record:
     part = _part(planned, states, k)
     record = recorded.columns(planned.legs[k], part, recorded.points(planned.legs[k], part))
     del record["time"]
-    if planned.robot.side_step is not None:
-        record |= _side(planned, states, k)
+    for i in range(len(planned.robot.hip_motors)):
+        record |= _turned(planned, states, k, i)
     # Held out of reach of the floor, a foot has a sensor of its force too.
     if isinstance(planned.scene, Floor):
         force = wrench(states, k)[:, : len(FORCE_COLUMNS)]
@@ -143,21 +144,21 @@ def _leg(planned: RobotPlan, states: States, k: int) -> Record:
     return {name: np.ascontiguousarray(column) for name, column in record.items()}
 
 
-def _side(planned: RobotPlan, states: States, k: int) -> Record:
-    """Return the columns of the motor S of leg k.
+def _turned(planned: RobotPlan, states: States, k: int, i: int) -> Record:
+    """Return the columns of motor i of the hip of leg k.
 
     tau = kp (u - theta) - kd theta_dot,   at a step's end; under `implicitfast` theta at its start
     """
-    side_step = planned.robot.side_step
-    assert side_step is not None
-    place = planned.robot.joints * (k - len(LEGS))
+    motor = planned.robot.hip_motors[i]
+    place = planned.robot.joints * (k - len(LEGS)) + i
     theta = states.qpos[0, :, place]
     rate = states.qvel[0, :, place]
-    command = planned.swings[:, k]
+    command = planned.swings[:, k, i]
     late = planned.sim.integrator == "discrete"
     acting = theta if late else np.concatenate([planned.start[place][None], theta[:-1]])
-    torque = side_step.kp * (command - acting) - side_step.kd * rate
-    return dict(zip(SIDE_COLUMNS, (theta, rate, command, torque), strict=True))
+    torque = motor.kp * (command - acting) - motor.kd * rate
+    names = [column(quantity, motor) for quantity in QUANTITIES]
+    return dict(zip(names, (theta, rate, command, torque), strict=True))
 
 
 def wrench(states: States, k: int) -> Array:
@@ -184,7 +185,7 @@ def saturated(went: Walk, k: int) -> Bools:
 
 def _part(planned: RobotPlan, states: States, k: int) -> Part:
     """Return all steps of leg k, as if it were alone."""
-    # The legs' joints are the last of the robot's; any S comes before a leg's other four.
+    # The legs' joints are the last of the robot's; those of its hip come before a leg's four.
     width = planned.robot.joints
     last = width * (k + 1 - len(LEGS))
     joints = slice(last - 4, last or None)

@@ -1,5 +1,7 @@
 """A foot path to the side: the path in the leg's own plane, and how the motor S turns the plane.
 
+A motor T turns all of it: the side is to the left of where the leg is steered.
+
 With the foot at (y, z) from the axis of S, across its x, and the leg's plane `a` beside the axis,
 
     u = -sqrt(y^2 + z^2 - a^2),   z_leg = u - along,   theta_S = atan2(z, y) - atan2(u, a)
@@ -17,7 +19,7 @@ from fivebar_sim.errors import ArgumentError
 from fivebar_sim.paths import Sample
 from fivebar_sim.paths.base import ease, times
 from fivebar_sim.robots.ahead import Ahead, Led
-from fivebar_sim.robots.robot import Hip
+from fivebar_sim.robots.hips.hip import Hip
 
 
 class Across(NamedTuple):
@@ -99,11 +101,12 @@ def sided(path: Ahead, sideways: float, hip: Hip) -> Sideways:
         hip: The hip.
     """
     assert hip.side_step is not None
+    _, across, along = hip.offset(hip.side_step)
     return Sideways(
         ramp=path.ramp,
         outside=path.outside,
         path=path,
         sideways=sideways,
-        across=hip.across,
-        along=hip.side_step.along,
+        across=across,
+        along=along,
     )
