@@ -22,10 +22,12 @@ from fivebar_sim.errors import RunDirectoryError
 from fivebar_sim.files import resources
 from fivebar_sim.metrics.measured import Judged
 from fivebar_sim.report import comparison, html, look, single
+from fivebar_sim.robots.scenario import RobotScenario
 from fivebar_sim.rollout import Result
 from fivebar_sim.runs import checksums, directory, stored
-from fivebar_sim.runs.anew import beside
+from fivebar_sim.runs.anew import beside, robots
 from fivebar_sim.scenario import Scenario
+from fivebar_sim.walking.plan import plan_scenario
 
 SOME = ("payload-ellipse", "q8bot-trot", "rail-landing", "rail-hop")
 """Pushes, a CSV, a landing, a ground under `implicitfast`."""
@@ -97,7 +99,12 @@ def test_record_and_scenario_of_all_are_enough(name: str, tmp_path: Path) -> Non
 
 
 def test_those_of_a_robot_are_enough(tmp_path: Path) -> None:
-    result = rollout.run(Scenario.load("robot-q8bot-turn", ["duration=1.1"]))
+    """With what a record has no column of besides, pushes, and motors of its hips."""
+    hips = 'robot.hips.steering={kp=4, kd=0.03, mass="10 g"}'
+    steered = "gait.steering={FL=0.2, FR=0.2, RL=0, RR=0}"
+    push = "push=[{time=0.7, duration=0.02, force=[0, 2, 0], at=[0, 0, 0.02]}]"
+    settings = ["duration=1.1", "robot.mass=0.3", hips, steered, push]
+    result = rollout.run(Scenario.load("robot-q8bot-turn", settings))
     read = stored.read(_bare(result, tmp_path / "run"))
     _check_alike(read.measured, result.measured, OF_ROBOTS)
 
@@ -108,6 +115,14 @@ def test_those_of_all_robots_are_enough(name: str, tmp_path: Path) -> None:
     result = rollout.run(Scenario.load(name))
     read = stored.read(_bare(result, tmp_path / "run"))
     _check_alike(read.measured, result.measured, OF_ROBOTS)
+
+
+def test_uneven_ground_cannot_be_measured_anew() -> None:
+    scenario = Scenario.load("robot-q8bot-stand", ["scene.ground=rough"])
+    assert isinstance(scenario, RobotScenario)
+    planned = plan_scenario(scenario)
+    with pytest.raises(RunDirectoryError, match="the forces, but not where they act"):
+        robots.walk(planned, {}, np.zeros(0, dtype=bool))
 
 
 @pytest.fixture(scope="module")
