@@ -15,7 +15,7 @@ from fivebar_sim.control.servo import Servo
 from fivebar_sim.geometry import FiveBar
 from fivebar_sim.scenario.scenes import Rail
 from fivebar_sim.simulation import lean
-from fivebar_sim.simulation.limited import STATE
+from fivebar_sim.simulation.limits.limited import STATE
 from fivebar_sim.simulation.steps import Legs
 
 CLASSIC = FiveBar.load("classic")

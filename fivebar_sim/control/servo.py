@@ -346,7 +346,7 @@ def applied_torque(servo: Servo | ServoArrays, step: MotorStep) -> Array:
         implicitfast:  tau = clip(kp (u - q)  - kd v+, limit) - (limit / speed) v+
         torque drive:  tau = clip(u, limit) - (limit / speed) v+
 
-    `simulation.limited` keeps the limit so; MuJoCo alone decides with the step's start whether it
+    `simulation.limits` keeps the limit so; MuJoCo alone decides with the step's start whether it
     clips.
     """
     asked = _asked(servo, step)

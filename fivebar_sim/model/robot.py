@@ -239,7 +239,7 @@ def _turn(spec: mujoco.MjSpec, hip: Hip, name: str) -> None:
         joint.armature = motor.armature
         joint.damping[0] = motor.kd
         # Of a hinge it is the same as its joint; motors without limits are not among those that
-        # keep theirs (`simulation.clipping`).
+        # keep theirs (`simulation.limits.clipping`).
         drive = spec.add_actuator(
             name=joint.name, trntype=mujoco.mjtTrn.mjTRN_JOINTINPARENT, target=joint.name
         )

@@ -15,9 +15,10 @@ from fivebar_sim.errors import ArgumentError, DivergedError
 from fivebar_sim.kinematics.stops import SPEED_LIMIT
 from fivebar_sim.model import friction_law, without_log
 from fivebar_sim.model.gears import Gears, rubbed, spread
-from fivebar_sim.simulation.clipping import Clipping
 from fivebar_sim.simulation.lean import lean, recorded_columns, without_clock
-from fivebar_sim.simulation.limited import STATE, rollout
+from fivebar_sim.simulation.limits.alone import Alone
+from fivebar_sim.simulation.limits.clipping import Clipping
+from fivebar_sim.simulation.limits.limited import STATE, rollout
 
 STEP = ("qfrc_constraint", "solver_niter")
 """What is recorded of every step besides."""
@@ -113,6 +114,9 @@ class Legs:
         self._batch.qpos = qpos
         self._ctrl = self._batch.bind("ctrl")
         self._clipping = Clipping.of(everyone)
+        # One alone is looked at step by step; many are looked at together.
+        single = len(qpos) == 1 and not self.whole
+        self._alone = Alone(first, self._batch, self._clipping) if single else None
         self._sizes = first.nq, first.nv, first.nu
         self._ground = recorded_columns(first)
 
@@ -129,7 +133,7 @@ class Legs:
         out = self._taken(ctrl, record)
         # A step that keeps a torque limit may have been sent another command.
         arrays = [out[STATE], *(out[name] for name in record[1:])]
-        return self.states(arrays, ctrl.copy(), self._batch.warning)
+        return self.states(arrays, ctrl.copy(), self.warned())
 
     def moved(self, ctrl: Array) -> tuple[Array, Array, NDArray[Any]]:
         """Return qpos and qvel after the next steps, (nsim, n, nq), and the warnings so far.
@@ -138,7 +142,7 @@ class Legs:
         """
         state = self._taken(ctrl, (STATE,))[STATE]
         nq, nv, _ = self._sizes
-        warnings = self._batch.warning[..., 1].sum(axis=1)
+        warnings = self.warned()[..., 1].sum(axis=1)
         return state[..., 1 : 1 + nq], state[..., 1 + nq : 1 + nq + nv], warnings
 
     def _taken(self, ctrl: Array, record: Sequence[Any]) -> dict[Any, Array]:
@@ -153,10 +157,13 @@ class Legs:
         with without_log(), without_clock():
             if self._gears is None:
                 return self._rollout(ctrl, record)
-            return rubbed(self._batch, self._gears, ctrl, record, self._rollout)
+            turning = self._batch if self._alone is None else self._alone
+            return rubbed(turning, self._gears, ctrl, record, self._rollout)
 
     def _rollout(self, ctrl: Array, record: Sequence[Any]) -> dict[Any, Array]:
         """Return what is recorded of the next steps, with torque limits kept."""
+        if self._alone is not None:
+            return self._alone.rollout(ctrl, record)
         if self._clipping is None:
             return self._batch.rollout(ctrl.shape[1], ctrl, record=record)
         return rollout(self._batch, self._clipping, ctrl, record)
@@ -209,7 +216,7 @@ class Legs:
 
     def warned(self) -> NDArray[Any]:
         """Return MuJoCo's warnings of each simulation as they are now, (nsim, kinds, 2)."""
-        return self._batch.warning
+        return self._batch.warning if self._alone is None else self._alone.warning
 
     def once(self, ctrl: Array) -> None:
         """Take one step with finite commands, (nsim, nu)."""

@@ -17,9 +17,9 @@ from fivebar_sim.arrays import Array
 from fivebar_sim.metrics.columns import MOTORS
 from fivebar_sim.model import without_log
 from fivebar_sim.model.gears import Gears, rubbed
-from fivebar_sim.simulation.clipping import Clipping
 from fivebar_sim.simulation.lean import recorded_columns
-from fivebar_sim.simulation.limited import STATE, rollout
+from fivebar_sim.simulation.limits.clipping import Clipping
+from fivebar_sim.simulation.limits.limited import STATE, rollout
 from fivebar_sim.tasks import REASONS
 from fivebar_sim.tasks.episodes import Episodes, Outcome
 

@@ -1,6 +1,6 @@
 """Warp's kernels: commands in, states out, and torque limits that hold at the end of a step.
 
-The limits are those of `simulation.clipping`, which explains modes; here a leg has a thread.
+The limits are those of `simulation.limits.clipping`, which explains modes; here a leg has a thread.
 """
 # Warp reads annotations as types of its own, and its operators are not Python's.
 # pyright: reportInvalidTypeForm=false, reportMissingImports=false, reportArgumentType=false

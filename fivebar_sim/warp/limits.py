@@ -1,4 +1,4 @@
-"""Torque limits of legs on a device, kept at the end of a step as `simulation.limited` does."""
+"""Torque limits of legs on a device, kept at the end of a step as `simulation.limits` does."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from fivebar_sim.simulation.clipping import MOST_MODES, Clipping
+from fivebar_sim.simulation.limits.clipping import MOST_MODES, Clipping
 from fivebar_sim.warp import device as devices
 from fivebar_sim.warp.stepping import take_step
 

@@ -15,7 +15,7 @@ agree: then the step is taken with the constant torques that it ends with.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import cache
 from itertools import product
 from typing import NamedTuple
@@ -36,6 +36,9 @@ UNLIMITED = 1e300
 
 MOST_MODES = 9
 """Modes of the motors of one leg; so many are tried of more motors, too."""
+
+TRIES = 10
+"""Most attempts to find constant torques; the second is exact where nothing touches or lets go."""
 
 
 @cache
@@ -156,6 +159,29 @@ def clipped(offset: Array, slope: Array, limit: Array) -> Array:
             best = torque
             least = misses
     return best
+
+
+def settle(ended: Callable[[Array], Array], limit: Array) -> bool:
+    """Take a step with the constant torques that it ends with; return whether they were found.
+
+    Args:
+        ended: Takes it with some torques, and returns what it asks for at its end, (motors,).
+        limit: Largest torques, (motors,).
+    """
+    motors = len(limit)
+    torque = np.zeros(motors)
+    for _ in range(TRIES):
+        now = ended(torque)
+        if (np.abs(np.clip(now, -limit, limit) - torque) <= SLACK * limit).all():
+            return True
+
+        slope = np.empty((motors, motors))
+        for motor in range(motors):
+            other = torque.copy()
+            other[motor] -= np.copysign(0.1 * limit[motor], torque[motor])
+            slope[:, motor] = (ended(other) - now) / (other - torque)[motor]
+        torque = clipped(now - slope @ torque, slope, limit)
+    return False
 
 
 def sides(asked: Array, limit: Array) -> Integers:

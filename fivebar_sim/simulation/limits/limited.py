@@ -10,14 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fivebar_sim.arrays import Array, Bools
-from fivebar_sim.simulation.clipping import (
+from fivebar_sim.simulation.limits.clipping import (
     MOST_MODES,
-    SLACK,
     Clipping,
     Integers,
-    clipped,
     modes_of,
     number,
+    settle,
 )
 
 INPUTS = mujoco.mjtState.mjSTATE_CTRL | mujoco.mjtState.mjSTATE_QFRC_APPLIED
@@ -34,9 +33,6 @@ ITERATIONS = "solver_niter"
 
 UNSOLVED = 1_000_000
 """Iterations that stand for a step whose torques were not found."""
-
-TRIES = 10
-"""Most attempts to find them; the second is exact where nothing touches or lets go."""
 
 
 class Stepper(Protocol):
@@ -223,19 +219,9 @@ class _Part:
             rows = self._again(one, k, ctrl, clipping.constant(torque[None, None], q, v))
             return clipping.asked(ctrl[:, None, self._own], q, *self._motors(rows[STATE]))[0, 0]
 
-        torque = np.zeros(clipping.motors)
-        for _ in range(TRIES):
-            now = asked(torque)
-            if (np.abs(np.clip(now, -limit, limit) - torque) <= SLACK * limit).all():
-                return
-            slope = np.empty((clipping.motors, clipping.motors))
-            for motor in range(clipping.motors):
-                other = torque.copy()
-                other[motor] -= np.copysign(0.1 * limit[motor], torque[motor])
-                slope[:, motor] = (asked(other) - now) / (other - torque)[motor]
-            torque = clipped(now - slope @ torque, slope, limit)
-        # Nothing else is known of this step than that its equations are not solved.
-        self.rows[ITERATIONS][one, k] = UNSOLVED
+        if not settle(asked, limit):
+            # Nothing else is known of this step than that its equations are not solved.
+            self.rows[ITERATIONS][one, k] = UNSOLVED
 
     def _again(self, who: Integers, k: Integers, ctrl: Array, forced: Array) -> dict[Any, Array]:
         """Take step k of some simulations again, (m,), keep and return what is recorded."""

@@ -1,0 +1,1 @@
+"""Torque limits that are kept in every step."""

@@ -1,0 +1,231 @@
+"""Steps of one leg or robot that need a look each: for a torque limit, or friction that changes.
+
+Where a limit is not kept a step is taken again, as `limited` does for many, to the same bits. Far
+from the limits many steps are one call. Near them each is MuJoCo's own, with nothing around it: a
+call for one step of a batch costs more than the step.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import product
+from typing import Any
+
+import mujoco
+import numpy as np
+from mujoco.batch import Batch
+
+from fivebar_sim.arrays import Array
+from fivebar_sim.simulation.limits.clipping import MOST_MODES, Clipping, settle
+from fivebar_sim.simulation.limits.limited import ITERATIONS, STATE, UNSOLVED, WARMSTART
+from fivebar_sim.simulation.limits.servos import Servos
+
+WHOLE = mujoco.mjtState.mjSTATE_INTEGRATION
+"""All that the next step depends on."""
+
+FAR = 64
+"""After so many steps that were right, half as many are taken together; fewer do not pay."""
+
+BEGIN = 512
+"""Stands for the steps before the first: most runs never come to a limit."""
+
+
+class Alone:
+    """One leg or robot; as much of `mujoco.batch.Batch` as is needed of it.
+
+    Args:
+        model: Its model, of which `expand` is written.
+        batch: A batch of it alone, in the state that it begins in.
+        clipping: Its servos; None without torque limits.
+
+    Attributes:
+        qpos, qvel: Its state, (1, ...).
+        warning: (last info, count) of each kind of MuJoCo's warnings, (1, kinds, 2).
+    """
+
+    def __init__(self, model: mujoco.MjModel, batch: Batch, clipping: Clipping | None) -> None:
+        self._model = model
+        self._data = mujoco.MjData(model)
+        self._batch = batch
+        mujoco.mj_setState(model, self._data, batch.state[0], WHOLE)
+
+        self.qpos = self._data.qpos[None]
+        self.qvel = self._data.qvel[None]
+        self.warning = batch.warning.copy()
+
+        self._warm = self._data.qacc_warmstart
+        self._warnings = self._data.warning.number
+        self._servos = None if clipping is None else Servos(clipping, self._data)
+        self._right = BEGIN
+
+    def expand(self, name: str) -> Array:
+        """Return a field of the model, (1, ...), to be written."""
+        return getattr(self._model, name)[None]
+
+    def rollout(self, ctrl: Array, record: Sequence[Any]) -> dict[Any, Array]:
+        """Return what is recorded after each step; after a warning the last records repeat.
+
+        Args:
+            ctrl: Commands of every step, (1, N, nu).
+            record: What to record.
+        """
+        steps = ctrl.shape[1]
+        rows = _Rows(self._model, self._data, record, steps)
+        servos = self._servos
+        warned = self._warnings.tolist()
+        k = 0
+
+        while k < steps:
+            length = min(self._right // 2, steps - k)
+            if servos is None:
+                self._data.ctrl[:] = ctrl[0, k]
+                mujoco.mj_step(self._model, self._data)
+                solved = True
+            elif self._right >= FAR and length > 1:
+                k += self._together(servos, ctrl[:, k : k + length], rows, k)
+                continue
+            else:
+                solved = self._limited(servos, ctrl[0, k], rows, k)
+
+            rows.keep(k, solved=solved)
+            k += 1
+            if self._warnings.tolist() != warned:
+                rows.repeat(k)
+                break
+
+        self.warning[0, :, 1] = self._warnings
+        return rows.arrays
+
+    def _together(self, servos: Servos, ctrl: Array, rows: _Rows, k: int) -> int:
+        """Take the steps from k on with commands (1, n, nu), and return how many are right."""
+        length = ctrl.shape[1]
+        mujoco.mj_getState(self._model, self._data, self._batch.state[0], WHOLE)
+        out = {item: each[:, k : k + length] for item, each in rows.arrays.items()}
+        out[WARMSTART] = np.empty((1, length, len(self._warm)))
+        warned = self._batch.warning.copy()
+        self._batch.rollout(length, ctrl, record=tuple(out), out=out)
+
+        # The step in question is found singly: this is still in the state before.
+        if (self._batch.warning != warned).any():
+            self._right = 0
+            return 0
+
+        states = np.concatenate([rows.before(k)[None, None], out[STATE]], axis=1)
+        wrong = servos.wrong(ctrl, states[:, :-1], states[:, 1:])
+        good = int(wrong.argmax()) if wrong.any() else length
+        self._right = 0 if good < length else self._right + length
+        if good:
+            self._put_back(states[0, good], out[WARMSTART][0, good - 1])
+        return good
+
+    def _limited(self, servos: Servos, ctrl: Array, rows: _Rows, k: int) -> bool:
+        """Take step k with commands (nu,), and again if a limit is not kept.
+
+        Returns:
+            Whether its torques were found.
+        """
+        warm = self._warm.copy()
+        warned = self._warnings.tolist()
+        self._data.ctrl[:] = ctrl
+        servos.begin(ctrl[servos.own].tolist())
+        mujoco.mj_step(self._model, self._data)
+        self._right += 1
+        if not servos.is_wrong():
+            return True
+
+        self._right = 0
+        # Warnings of a step that is thrown away do not count.
+        self._warnings[:] = warned
+        return self._retake(servos, rows.before(k), warm)
+
+    def _retake(self, servos: Servos, before: Array, warm: Array) -> bool:
+        """Take a step again, that was just taken, until its modes agree with its end.
+
+        Args:
+            servos: The servos.
+            before: The state before it: time, qpos and qvel.
+            warm: Where its solver starts.
+
+        Returns:
+            Whether its torques were found.
+        """
+
+        def again() -> None:
+            self._put_back(before, warm)
+            mujoco.mj_step(self._model, self._data)
+            servos.release()
+
+        def ended(torque: Array) -> Array:
+            servos.push_constant(torque)
+            again()
+            return servos.asked()
+
+        begun = servos.begun()
+        modes = servos.ended(begun)
+        tried = {begun}
+        while len(tried) < MOST_MODES:
+            tried.add(modes)
+            servos.push(modes)
+            again()
+            asked = servos.ended(modes)
+            if asked == modes:
+                return True
+            # One that was tried already would be tried for ever: the first that was not is next.
+            every = product((0, 1, -1), repeat=len(modes))
+            left = (each for each in every if each not in tried)
+            modes = next(left, modes) if asked in tried else asked
+        return settle(ended, servos.limit)
+
+    def _put_back(self, state: Array, warm: Array) -> None:
+        """Put it into another state: time, qpos and qvel, and where the solver starts."""
+        mujoco.mj_setState(self._model, self._data, state, STATE)
+        self._warm[:] = warm
+
+
+class _Rows:
+    """What is recorded of some steps.
+
+    Args:
+        model: The model.
+        data: What is recorded from.
+        record: What to record.
+        steps: How many steps.
+
+    Attributes:
+        arrays: Of each item, (1, steps, ...).
+    """
+
+    def __init__(
+        self, model: mujoco.MjModel, data: mujoco.MjData, record: Sequence[Any], steps: int
+    ) -> None:
+        self._model = model
+        self._data = data
+        self._start = np.empty(mujoco.mj_stateSize(model, STATE))
+        mujoco.mj_getState(model, data, self._start, STATE)
+
+        fields = [item for item in dict.fromkeys([*record, ITERATIONS]) if item != STATE]
+        live = {item: getattr(data, item) for item in fields}
+        self._states = np.empty((steps, len(self._start)))
+        self.arrays: dict[Any, Array] = {STATE: self._states[None]}
+        self.arrays |= {
+            item: np.empty((1, steps, *now.shape), now.dtype) for item, now in live.items()
+        }
+        self._pairs = [(self.arrays[item][0], now) for item, now in live.items()]
+
+    def keep(self, k: int, *, solved: bool) -> None:
+        """Keep what MuJoCo has after step k."""
+        mujoco.mj_getState(self._model, self._data, self._states[k], STATE)
+        for kept, now in self._pairs:
+            kept[k] = now
+        if not solved:
+            # Nothing else is known of this step than that its equations are not solved.
+            self.arrays[ITERATIONS][0, k] = UNSOLVED
+
+    def repeat(self, count: int) -> None:
+        """Repeat the last of some steps until the end."""
+        for each in self.arrays.values():
+            each[:, count:] = each[:, count - 1 : count]
+
+    def before(self, k: int) -> Array:
+        """Return the state before step k: time, qpos and qvel."""
+        return self._states[k - 1] if k > 0 else self._start

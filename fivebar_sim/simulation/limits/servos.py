@@ -1,0 +1,136 @@
+"""The servos of one leg or robot in one step, in plain numbers: see `clipping`.
+
+Arrays of two to twelve numbers would take several times as long.
+"""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+
+from fivebar_sim.arrays import Array, Bools
+from fivebar_sim.simulation.limits.clipping import SLACK, Clipping
+
+Modes = tuple[int, ...]
+"""The mode of each motor."""
+
+
+class Servos:
+    """The servos, bound to MuJoCo's data of their leg or robot.
+
+    Args:
+        clipping: Their numbers, of one simulation.
+        data: The data.
+
+    Attributes:
+        own: Where their commands are in ctrl.
+        limit: Largest torques [N m], (motors,).
+    """
+
+    def __init__(self, clipping: Clipping, data: mujoco.MjData) -> None:
+        self._clipping = clipping
+        self._joints = clipping.joints
+        self._late = bool(clipping.late.item())
+        self._kp: list[float] = clipping.kp[0, 0].tolist()
+        self._kd: list[float] = clipping.kd[0, 0].tolist()
+        self._limit: list[float] = clipping.limit[0, 0].tolist()
+        self.own = slice(-clipping.motors, None)
+        self.limit = clipping.limit[0, 0]
+
+        self._qpos = data.qpos
+        self._qvel = data.qvel
+        self._ctrl = data.ctrl
+        self._forces = data.qfrc_applied
+
+    def begin(self, sent: list[float]) -> None:
+        """Remember the state before a step, and its commands (motors,)."""
+        self._u = sent
+        self._q: list[float] = self._qpos[self._joints].tolist()
+        self._v: list[float] = self._qvel[self._joints].tolist()
+
+    def is_wrong(self) -> bool:
+        """Return whether the step ends in other modes than MuJoCo chose at its start."""
+        motors = zip(
+            self._kp, self._kd, self._limit, self._u, self._q, self._v, *self._end(), strict=True
+        )
+        for kp, kd, limit, u, q, v, q_end, v_end in motors:
+            begun = kp * (u - q) - kd * v
+            ended = kp * (u - q_end) - kd * v_end
+            # Most are within; NaN is not, and neither beyond.
+            if -limit <= begun <= limit and -limit <= ended <= limit:
+                continue
+            mode = _side(begun, limit)
+            if _end_side(ended, mode, limit) != mode:
+                return True
+        return False
+
+    def begun(self) -> Modes:
+        """Return the modes that MuJoCo chose with the state before the step."""
+        asked = self._asked(self._q, self._v)
+        return tuple(map(_side, asked, self._limit))
+
+    def ended(self, modes: Modes) -> Modes:
+        """Return the modes that the state after the step in some modes calls for."""
+        return tuple(map(_end_side, self._asked(*self._end()), modes, self._limit))
+
+    def asked(self) -> Array:
+        """Return what the step ends with before a limit clips it [N m], (motors,)."""
+        return np.array(self._asked(*self._end()))
+
+    def push(self, modes: Modes) -> None:
+        """Send what makes the next step one in these modes; see `release`."""
+        u, q, v = (np.array(each)[None, None] for each in (self._u, self._q, self._v))
+        self._send(self._clipping.forced(np.array(modes)[None, None], u, q, v)[0, 0])
+
+    def push_constant(self, torque: Array) -> None:
+        """Send what makes the next step one with these torques [N m]; see `release`."""
+        q, v = (np.array(each)[None, None] for each in (self._q, self._v))
+        self._send(self._clipping.constant(torque[None, None], q, v)[0, 0])
+
+    def release(self) -> None:
+        """Push no more."""
+        self._forces[self._joints] = 0.0
+
+    def wrong(self, ctrl: Array, before: Array, after: Array) -> Bools:
+        """Return which of many steps are wrong in the modes that MuJoCo chose, (N,).
+
+        Args:
+            ctrl: Commands, (1, N, nu).
+            before: Time, qpos and qvel before each step, (1, N, 1 + nq + nv).
+            after: And after it.
+        """
+        u = ctrl[..., self.own]
+        q, v = self._motors(before)
+        begun = self._clipping.begun(u, q, v)
+        asked = self._clipping.ended(begun, u, q, *self._motors(after))
+        return (begun != asked).any(axis=-1)[0]
+
+    def _motors(self, state: Array) -> tuple[Array, Array]:
+        nq = len(self._qpos)
+        return state[..., 1 : 1 + nq][..., self._joints], state[..., 1 + nq :][..., self._joints]
+
+    def _end(self) -> tuple[list[float], list[float]]:
+        """Return the angles that the springs act with, and the rates after the step."""
+        q: list[float] = self._qpos[self._joints].tolist() if self._late else self._q
+        return q, self._qvel[self._joints].tolist()
+
+    def _asked(self, angles: list[float], rates: list[float]) -> list[float]:
+        motors = zip(self._kp, self._kd, self._u, angles, rates, strict=True)
+        return [kp * (u - q) - kd * v for kp, kd, u, q, v in motors]
+
+    def _send(self, forced: Array) -> None:
+        """Send commands and joint torques, (2 motors,)."""
+        count = len(self._kp)
+        self._ctrl[self.own] = forced[:count]
+        self._forces[self._joints] = forced[count:]
+
+
+def _side(asked: float, limit: float) -> int:
+    """Return on which side a torque is beyond a limit, 0 within it and for NaN."""
+    return (asked > limit) - (asked < -limit)
+
+
+def _end_side(asked: float, mode: int, limit: float) -> int:
+    """Return the mode that a torque calls for at the end of a step in some mode."""
+    # On the limit, to rounding, both modes give the same torque: the present one stays.
+    return _side(asked + SLACK * mode * limit, (1.0 + SLACK * (mode == 0)) * limit)
