@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Callable
 from typing import Any
 
@@ -16,6 +17,7 @@ from fivebar_sim import kinematics
 from fivebar_sim.control.servo import Servo
 from fivebar_sim.errors import ConfigError
 from fivebar_sim.gym import LegEnv
+from fivebar_sim.render.leg_picture import LegPicture
 from fivebar_sim.vector import LegVectorEnv
 
 ONE = np.float64(1.0)
@@ -198,3 +200,19 @@ def test_picture_shows_the_leg() -> None:
     assert first.std() > 5.0
     assert (first != second).any()
     assert LegEnv("stand").render() is None
+
+
+def test_picture_has_a_shadow_as_fine_as_it_is() -> None:
+    env = LegEnv("stand")
+    bare = copy.copy(env.model)
+    bare.light_castshadow[:] = False
+    seen = []
+    try:
+        for model in (env.model, bare):
+            picture = LegPicture(model, env.task.leg, width=64, height=48)
+            assert picture._model.vis.quality.shadowsize == 128
+            seen.append(picture.take(model.key("home").qpos))
+            picture.close()
+    except ConfigError as error:
+        pytest.skip(str(error))
+    assert (seen[0] != seen[1]).any(axis=-1).mean() > 0.02

@@ -80,6 +80,8 @@ class LegPicture:
         model = copy.copy(model)
         model.vis.global_.offwidth = width
         model.vis.global_.offheight = height
+        # Drawn anew for each picture: MuJoCo's 4096 would take most of the time of a small one.
+        model.vis.quality.shadowsize = min(2 * max(width, height), model.vis.quality.shadowsize)
         self._model = model
         self._data = mujoco.MjData(model)
         self._size = leg.size
