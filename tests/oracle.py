@@ -13,7 +13,7 @@ from __future__ import annotations
 import cmath
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -69,11 +69,12 @@ class Leg:
             assembly=spec.assembly,
         )
 
-    @property
-    def motors(self) -> tuple[complex, complex]:
-        """A and E [m], half of L5 to either side of the origin."""
+    motors: tuple[complex, complex] = field(init=False, repr=False, compare=False)
+    """A and E [m], half of L5 to either side of the origin."""
+
+    def __post_init__(self) -> None:
         half = cmath.rect(0.5 * self.lengths[4], self.tilt)
-        return -half, half
+        object.__setattr__(self, "motors", (-half, half))
 
 
 def crossing(centre: complex, radius: float, other: complex, reach: float, side: int) -> complex:
@@ -187,28 +188,47 @@ def jacobian(arms: Arms) -> list[list[float]]:
 
 
 def mass_matrix(leg: Leg, psi: Floats) -> list[list[float]]:
-    """Return M = sum (m J^T J + I) + armature [kg m^2] of the open tree; J of the centres."""
-    M = [[0.0] * 4 for _ in range(4)]
-    for i, (_, arms) in enumerate(centres(leg, psi)):
-        M[i][i] += leg.inertia[i]
-        for j, r in arms:
-            for k, s in arms:
-                M[j][k] += leg.mass[i] * (r.conjugate() * s).real
-    M[0][0] += leg.armature
-    M[3][3] += leg.armature
-    return M
+    """Return M = sum (m J^T J + I) + armature [kg m^2] of the open tree; J of the centres.
+
+    Two arms of one centre meet at the angle between their links; an arm meets itself at none.
+    """
+    L1, _, _, L4, _ = leg.lengths
+    _, m2, m3, _ = leg.mass
+    _, c2, c3, _ = leg.com
+    own = [
+        i + m * (c.real * c.real + c.imag * c.imag)
+        for i, m, c in zip(leg.inertia, leg.mass, leg.com, strict=True)
+    ]
+    left = m2 * L1 * (c2 * cmath.rect(1.0, psi[1] - psi[0])).real
+    right = m3 * L4 * (c3 * cmath.rect(1.0, psi[2] - psi[3])).real
+    return [
+        [own[0] + m2 * L1 * L1 + leg.armature, left, 0.0, 0.0],
+        [left, own[1], 0.0, 0.0],
+        [0.0, 0.0, own[2], right],
+        [0.0, 0.0, right, own[3] + m3 * L4 * L4 + leg.armature],
+    ]
 
 
 def bias(leg: Leg, psi: Floats, psi_dot: Floats, foot_force: complex = 0j) -> list[float]:
     """Return h = sum m J^T (J_dot psi_dot - g) - J_F^T F [N m] of the open tree, four numbers."""
-    h = [0.0] * 4
-    loads = [(foot(leg, psi)[1], -foot_force)]
-    for m, (_, arms) in zip(leg.mass, centres(leg, psi), strict=True):
-        loads.append((arms, m * (centripetal(arms, psi_dot) - leg.gravity)))
-    for arms, force in loads:
-        for k, r in arms:
-            h[k] += r.real * force.imag - r.imag * force.real  # (1j r) . force
-    return h
+    e1, e2, e3, e4 = (cmath.rect(1.0, angle) for angle in psi)
+    w1, w2, w3, w4 = (rate * rate for rate in psi_dot)
+    m1, m2, m3, m4 = leg.mass
+    c1, c2, c3, c4 = (c * e for c, e in zip(leg.com, (e1, e2, e3, e4), strict=True))
+    B = leg.lengths[0] * e1
+    D = leg.lengths[3] * e4
+    g = leg.gravity
+    f1 = m1 * (-c1 * w1 - g)
+    f2 = m2 * (-B * w1 - c2 * w2 - g)
+    f3 = m3 * (-D * w4 - c3 * w3 - g)
+    f4 = m4 * (-c4 * w4 - g)
+    # (1j r) . f of every arm: the imaginary part of r* f
+    return [
+        (c1.conjugate() * f1 + B.conjugate() * (f2 - foot_force)).imag,
+        (c2.conjugate() * f2 - (leg.foot_offset * e2).conjugate() * foot_force).imag,
+        (c3.conjugate() * f3).imag,
+        (c4.conjugate() * f4 + D.conjugate() * f3).imag,
+    ]
 
 
 def energy(leg: Leg, psi: Floats, psi_dot: Floats) -> float:
