@@ -17,6 +17,7 @@ from fivebar_sim.metrics.columns import (
     RAIL_COLUMN,
 )
 from fivebar_sim.robots import columns as robots
+from fivebar_sim.robots.hips.motors import MOTORS, QUANTITIES, column
 from fivebar_sim.robots.robot import LEGS
 from fivebar_sim.runs import directory
 from fivebar_sim.runs.described import Described, described
@@ -25,7 +26,9 @@ OF_LEGS = (*COLUMNS, *FRICTION_COLUMNS, *HIP_COLUMNS, *GROUND_COLUMNS, RAIL_COLU
 
 
 def test_every_column_is_described() -> None:
-    of_robots = [f"{leg}_{name}" for leg in LEGS for name in (*COLUMNS[1:], *GROUND_COLUMNS)]
+    hips = [column(quantity, motor) for motor in MOTORS for quantity in QUANTITIES]
+    own = (*COLUMNS[1:], *hips, *GROUND_COLUMNS)
+    of_robots = [f"{leg}_{name}" for leg in LEGS for name in own]
     every = [*OF_LEGS, *robots.TRUNK_COLUMNS, *of_robots]
     assert [name for name in every if described(name) is None] == []
     said = [described(name) for name in every]

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
+import msgspec
 import mujoco
 import numpy as np
 import pytest
@@ -23,6 +24,7 @@ from fivebar_sim.robots.hips import turned
 from fivebar_sim.robots.measure import Trunk
 from fivebar_sim.robots.scenario import RobotScenario
 from fivebar_sim.walking.plan import plan_scenario
+from fivebar_sim.walking.recording import series
 from fivebar_sim.walking.task import WalkTask
 from fivebar_sim.walking.walk import walk
 
@@ -316,6 +318,7 @@ def test_record_scenario_and_pictures_have_the_motor(crabbing: Result) -> None:
     for k, leg in enumerate(LEGS):
         middle = data.geom(f"{leg}_foot").xpos
         np.testing.assert_allclose(drawn.walked.feet[k, -1], middle, atol=1e-9)
+    assert {"torque_A", "torque_T"} < {plot.path for plot in series(crabbing.record)}
     rows = {key: (label, unit) for key, label, unit in ROWS}
     assert rows["steer_rms"][0] == "torque T RMS"
     for key in ("steer_rms", "steer_peak", "steer_work", "steer_heat"):
@@ -374,6 +377,12 @@ def test_units_of_steering_are_understood() -> None:
     scenario = Scenario.load("robot-q8bot-trot", ["limits={}", PLAIN, steering])
     assert isinstance(scenario, RobotScenario)
     assert scenario.steering == {"FL": pytest.approx(np.pi / 18.0), "FR": 0, "RL": 0, "RR": -0.1}
+
+
+def test_legs_with_other_motors_than_the_first_are_refused(robot: Robot) -> None:
+    bare = {**robot.hips, "RL": Hip(pos=robot.hips["RL"].pos)}
+    with pytest.raises(ArgumentError, match=r"hips\.RL must have the same motors as hips\.FL"):
+        msgspec.structs.replace(robot, hips=bare)
 
 
 def test_environment_says_that_it_has_eight_actions(robot: Robot) -> None:

@@ -109,6 +109,9 @@ class Robot(msgspec.Struct, frozen=True, kw_only=True):
                 f"mass must be in ({legs:g}, {HEAVIEST:g}] kg, more than that of the four legs, "
                 f"got {self.mass!r}"
             )
+        for leg in LEGS:
+            if self.hips[leg].motors != self.hip_motors:
+                raise ArgumentError(f"hips.{leg} must have the same motors as hips.{LEGS[0]}")
         self._check_apart()
 
     def _check_apart(self) -> None:

@@ -26,6 +26,7 @@ from fivebar_sim.render import palette
 from fivebar_sim.robots import LEGS, Floor, Robot, places
 from fivebar_sim.robots.columns import of_leg, trunk
 from fivebar_sim.robots.hips import turned
+from fivebar_sim.robots.hips.motors import MOTORS, column
 from fivebar_sim.robots.measure import Trunk, heading, lean
 from fivebar_sim.robots.scenario import RobotScenario
 from fivebar_sim.scenario.run import Run
@@ -201,7 +202,8 @@ def series(record: Record) -> Iterator[Series]:
     """Yield the plots of a robot's run, in the order in which they are shown."""
     every = np.ones(len(record["time"]), dtype=bool)
     body = trunk(record)
-    for motor in ("A", "E"):
+    hips = [motor.letter for motor in MOTORS if f"{LEGS[0]}_{column('torque', motor)}" in record]
+    for motor in ("A", "E", *hips):
         columns = {leg: record[f"{leg}_torque_{motor}"] for leg in LEGS}
         yield _of_legs(f"torque_{motor}", f"Torques of {motor} [mN m]", columns, 1e3)
     errors = {
