@@ -19,7 +19,8 @@ from fivebar_sim.scenario import Scenario
 from fivebar_sim.simulation.steps import Legs
 from fivebar_sim.walking import energy
 from fivebar_sim.walking.plan import plan_scenario
-from fivebar_sim.walking.walk import Walk, before, walk
+from fivebar_sim.walking.record import before
+from fivebar_sim.walking.walk import Walk, walk
 
 SERVO = "robot.servo.preset=xl330-m288"
 

@@ -19,8 +19,9 @@ from fivebar_sim.robots.measure import Trunk
 from fivebar_sim.robots.scenario import RobotScenario
 from fivebar_sim.walking.measure import measure
 from fivebar_sim.walking.plan import plan_scenario
+from fivebar_sim.walking.record import wrench
 from fivebar_sim.walking.touching import depths
-from fivebar_sim.walking.walk import Walk, walk, wrench
+from fivebar_sim.walking.walk import Walk, walk
 
 ROUGH = 'scene.ground={kind="rough", height="5 mm", cell="20 mm", size="1 m", seed=3}'
 SHORT = ("duration=0.3", "limits={}", "path.ramp=0.1")

@@ -21,6 +21,9 @@ from fivebar_sim.robots.hips import turned
 from fivebar_sim.robots.hips.sideways import Sideways
 from fivebar_sim.robots.measure import Trunk
 from fivebar_sim.robots.scenario import RobotScenario
+from fivebar_sim.simulation.record import Part
+from fivebar_sim.simulation.steps import States
+from fivebar_sim.walking import record
 from fivebar_sim.walking.plan import plan_scenario
 from fivebar_sim.walking.task import WalkTask
 from fivebar_sim.walking.walk import walk
@@ -169,6 +172,28 @@ def test_robot_walks_to_the_left_and_its_energy_closes(aside: Result) -> None:
     assert abs(moved["speed"]) < 0.05
     assert moved["falls"] == 0
     assert aside.metrics["energy"]["imbalance"] < 1e-4
+
+
+def test_record_of_parts_is_that_of_the_whole() -> None:
+    """Which is what `--live` shows; states that no simulation had, of commands that change."""
+    planned = plan_scenario(stepping(f"gait.sideways={EACH % (1, 1, 1, 1)}"))
+    steps = planned.scenario.steps
+    rng = np.random.default_rng(2)
+    blank = np.zeros((1, steps, 0))
+    states = States(
+        time=planned.sim.timestep * np.arange(1.0, steps + 1.0)[None],
+        qpos=planned.start + 1e-3 * rng.standard_normal((1, steps, planned.model.nq)),
+        qvel=rng.standard_normal((1, steps, planned.model.nv)),
+        ctrl=rng.standard_normal((1, steps, planned.model.nu)),
+        ground=rng.standard_normal((1, steps, 12)),
+        constraint=rng.standard_normal((1, steps, planned.model.nv)),
+        iterations=blank,
+        warnings=np.zeros(1),
+    )
+    whole = record.columns(planned, Part(states, 0, planned.start))
+    late = Part(states.part(slice(100, 300)), 100, states.qpos[0, 99])
+    for name, column in record.columns(planned, late).items():
+        np.testing.assert_array_equal(column, whole[name][100:300], err_msg=name)
 
 
 def test_record_scenario_and_pictures_have_the_motor(aside: Result) -> None:

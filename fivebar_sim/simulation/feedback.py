@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator, Sequence
+from contextlib import closing
 from typing import NamedTuple
 
 import numpy as np
@@ -57,18 +58,40 @@ def steer(plans: Sequence[Plan], nthread: int, watch: Watch | None) -> Iterator[
         NoAnswerError: A controller that cannot answer, as where the loop would not close.
     """
     loop = _Loop(plans, nthread, GLANCE if watch is not None else np.inf)
-    pending: list[States] = []
-    shown = time.monotonic()
+    # What led to an error is worth seeing, too.
+    with closing(Glances(watch)) as glances:
+        for states in loop.blocks():
+            yield states
+            glances.add(states)
 
-    for states in loop.blocks():
-        yield states
-        if watch is None:
-            continue
-        pending.append(states)
-        if loop.over or time.monotonic() - shown >= GLANCE:
-            watch(States.joined(pending))
-            pending.clear()
-            shown = time.monotonic()
+
+class Glances:
+    """Shows states to whoever watches, every `GLANCE` those of all steps since the last time.
+
+    Args:
+        watch: Is shown them; None: nobody is.
+    """
+
+    def __init__(self, watch: Watch | None) -> None:
+        self._watch = watch
+        self._pending: list[States] = []
+        self._last = time.monotonic()
+
+    def add(self, states: States) -> None:
+        """Show the states of some steps, now or with later ones."""
+        if self._watch is None:
+            return
+        self._pending.append(states)
+        if time.monotonic() - self._last >= GLANCE:
+            self.close()
+
+    def close(self) -> None:
+        """Show all that was not shown yet."""
+        if self._watch is None or not self._pending:
+            return
+        self._watch(States.joined(self._pending))
+        self._pending.clear()
+        self._last = time.monotonic()
 
 
 class _Stop(NamedTuple):

@@ -17,7 +17,8 @@ from fivebar_sim.robots import LEGS, Floor
 from fivebar_sim.robots.columns import FORCE_COLUMNS, of_leg
 from fivebar_sim.robots.floor import load
 from fivebar_sim.robots.hips.motors import column
-from fivebar_sim.walking.walk import Walk, before, wrench
+from fivebar_sim.walking.record import before, wrench
+from fivebar_sim.walking.walk import Walk
 
 
 def balance(went: Walk) -> Balance:

@@ -6,6 +6,8 @@ knows of no leg, it does not know of a robot's: neither trunk nor other legs.
 
 from __future__ import annotations
 
+from contextlib import closing
+
 import numpy as np
 
 from fivebar_sim.arrays import Array
@@ -13,15 +15,20 @@ from fivebar_sim.errors import DivergedError, PoseError
 from fivebar_sim.metrics.columns import MOTOR_JOINTS
 from fivebar_sim.robots import LEGS
 from fivebar_sim.simulation.asked import Asked, Latest
+from fivebar_sim.simulation.feedback import Glances
 from fivebar_sim.simulation.plan import period_steps
-from fivebar_sim.simulation.steps import Legs, States, is_broken
+from fivebar_sim.simulation.steps import Legs, States, Watch, is_broken
 from fivebar_sim.walking.plan import RobotPlan
 
 
-def steered(planned: RobotPlan) -> States:
+def steered(planned: RobotPlan, watch: Watch | None = None) -> States:
     """Return the states of a robot whose legs have a feedback controller.
 
     Fewer than there are steps if the simulation broke down on the way.
+
+    Args:
+        planned: The plan.
+        watch: Is shown the states as they come.
 
     Raises:
         ConfigError: A controller that fails, or commands what is no finite (4, 2).
@@ -34,15 +41,19 @@ def steered(planned: RobotPlan) -> States:
     steps = planned.scenario.steps
     parts: list[States] = []
     latest: Latest | None = None
+    glances = Glances(watch)
 
-    for k in range(0, steps, every):
-        commands = _commands(planned, asked, k, latest)[:, : steps - k]
-        # What else there is, then one leg's motors beside the other's, as in ctrl.
-        besides = planned.besides[k : k + every]
-        parts.append(robot.advance(np.concatenate([besides, *commands], axis=-1)[None]))
-        if is_broken(parts[-1], slice(None)):
-            break
-        latest = _seen(parts[-1], planned.robot.joints)
+    # What led to an error is worth seeing, too.
+    with closing(glances):
+        for k in range(0, steps, every):
+            commands = _commands(planned, asked, k, latest)[:, : steps - k]
+            # What else there is, then one leg's motors beside the other's, as in ctrl.
+            besides = planned.besides[k : k + every]
+            parts.append(robot.advance(np.concatenate([besides, *commands], axis=-1)[None]))
+            glances.add(parts[-1])
+            if is_broken(parts[-1], slice(None)):
+                break
+            latest = _seen(parts[-1], planned.robot.joints)
     return States.joined(parts)
 
 
