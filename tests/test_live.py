@@ -20,12 +20,16 @@ from shell import Shell
 
 from fivebar_sim import rollout
 from fivebar_sim.errors import ConfigError
-from fivebar_sim.recording import live
+from fivebar_sim.recording import live, poses
 from fivebar_sim.recording import viewer as recording_viewer
+from fivebar_sim.recording.poses import Room
 from fivebar_sim.recording.relay import Relay
+from fivebar_sim.robots import LEGS
 from fivebar_sim.runs import directory
 from fivebar_sim.scenario import Scenario
 from fivebar_sim.simulation import feedback, steps
+from fivebar_sim.walking import live as live_robots
+from fivebar_sim.walking import recording
 
 RUNS = {
     "setpoints": ("classic-ellipse", ["duration=0.9"]),
@@ -79,6 +83,58 @@ def test_what_is_sent_is_what_was_simulated(name: str, kept: Path) -> None:
         np.ravel(moving["/tracking_error"]["Scalars:scalars"]), 1e3 * error[rows]
     )
     assert ("/floor" in static) == (name == "ground")
+
+
+STAND = ["duration=0.1", "path.seconds=0.1", "path.ramp=0.05", "limits={}"]
+ROBOTS = {
+    "feedback": [
+        "controller={name='pd', period=0.002}",
+        'robot.hips.side_step={kp=4, kd=0.03, mass="20 g", across=0, along=0}',
+    ],
+    "held": ["scene='air'"],
+}
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+def test_what_is_sent_of_a_robot_is_what_was_simulated(
+    name: str, kept: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Each entity is what the recording of the finished run has at the same steps."""
+    monkeypatch.setattr(steps, "WATCHED", 30)
+    monkeypatch.setattr(poses, "POSE_PERIOD", 1e-3)
+    plan = rollout.plan(Scenario.load("robot-q8bot-stand", [*STAND, *ROBOTS[name]]))
+    assert isinstance(plan, rollout.RobotPlan)
+    with live_robots.streaming(plan, "127.0.0.1:9876") as watch:
+        result = rollout.execute(plan, watch)
+    alone = rollout.execute(plan)
+    for column, values in result.record.items():
+        np.testing.assert_array_equal(values, alone.record[column], err_msg=column)
+
+    recording.write(kept.with_name("after.rrd"), [result])
+    moving, static = read(kept)
+    after, still = read(kept.with_name("after.rrd"))
+    assert moving.keys() == after.keys()
+    # How long the arrows will be is not known before.
+    lengths = {f"/ground_force/{leg}" for leg in LEGS}
+    for entity in after.keys() - lengths:
+        rows = np.array(moving[entity]["step"]) - 1
+        assert rows[0] == 0
+        assert len(rows) >= 6
+        assert (np.diff(rows) > 0).all()
+        for part, values in after[entity].items():
+            assert moving[entity][part] == [values[row] for row in rows], (entity, part)
+    # The text has no verdict, targets are those of all steps, and the floor reaches farther.
+    properties = {entity for entity in still if entity.startswith("/__properties/")}
+    assert static.keys() == still.keys() - properties
+
+
+def test_floor_reaches_as_far_as_the_robot_goes() -> None:
+    room = Room(np.array([-0.1, 0.0]), np.array([0.1, 0.05]), 0.1, 1.0, floor=True)
+    assert live_robots._reaching(room, -0.1, 0.1) is room
+    farther = live_robots._reaching(room, -0.05, 0.11)
+    np.testing.assert_allclose([farther.low, farther.high], [[-0.1, 0.0], [0.51, 0.05]])
+    back = live_robots._reaching(farther, -0.2, 0.3)
+    np.testing.assert_allclose([back.low, back.high], [[-0.6, 0.0], [0.51, 0.05]])
 
 
 @pytest.mark.parametrize(
@@ -205,8 +261,13 @@ def stalled(monkeypatch: pytest.MonkeyPatch) -> Iterator[str]:
         each.close()
 
 
-def test_stalled_viewer_does_not_keep_the_run(shell: Shell, stalled: str) -> None:
-    assert shell("run", "short.toml", "--live-at", stalled, "--out", "mine").status == 0
+@pytest.mark.parametrize("settings", [["short.toml"], ["robot-q8bot-stand", *STAND]])
+def test_stalled_viewer_does_not_keep_the_run(
+    settings: list[str], shell: Shell, stalled: str
+) -> None:
+    source, *changes = settings
+    told = [word for change in changes for word in ("--set", change)]
+    assert shell("run", source, *told, "--live-at", stalled, "--out", "mine").status == 0
     directory.check_run(shell.folder / "mine")
 
 

@@ -175,9 +175,6 @@ def test_program_runs_checks_and_refuses(shell: Shell) -> None:
     kept = {"scenario.toml", "metrics.json", "rollout.parquet", "recording.rrd"}
     assert {each.name for each in Path("r").iterdir()} == kept
     assert "robot" in json.loads(Path("r/metrics.json").read_text())
-    live = shell("run", name, "--live")
-    assert live.status == 2
-    assert "--live shows runs of legs" in live.err
 
 
 def test_settings_change_what_the_robot_is_made_of() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -14,7 +15,8 @@ from fivebar_sim.errors import ConfigError, DivergedError
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from fivebar_sim.rollout import Result
+    from fivebar_sim.rollout import AnyPlan, Result
+    from fivebar_sim.simulation.steps import Watch
 
 
 def run(
@@ -59,8 +61,6 @@ def run(
     if log is not None:
         _check_legs(orders, log)
     shown = live or live_at is not None
-    if shown:
-        _check_live(orders)
     viewer = _viewer(live_at) if shown else None
     return _run(orders, places, viewer, log, quiet=quiet, as_json=json)
 
@@ -74,18 +74,6 @@ def _check_legs(orders: list[Order], kind: str) -> None:
         measured.check_leg(order.scenario)
     if kind == "mcap":
         mcap_file.needed()
-
-
-def _check_live(orders: list[Order]) -> None:
-    """Raise if a run cannot be shown while it is simulated."""
-    from fivebar_sim.robots.scenario import RobotScenario
-
-    for order in orders:
-        if isinstance(order.scenario, RobotScenario):
-            raise ConfigError(
-                f"--live shows runs of legs, and {order.scenario.name} is a robot's: `fivebar "
-                "replay` shows it afterwards"
-            )
 
 
 def _viewer(address: str | None) -> str:
@@ -109,15 +97,23 @@ def _execute(order: Order, viewer: str | None, place: Path) -> Result:
         _write(result, place)
         return result
 
-    from fivebar_sim.recording import live
-
     planned = order.take()
-    assert isinstance(planned, rollout.Plan)
-    with live.streaming(planned, viewer) as watch:
+    with _streaming(planned, viewer) as watch:
         result = rollout.execute(planned, watch)
         # Before the viewer has everything: one that has stalled must not cost the result.
         _write(result, place)
     return result
+
+
+def _streaming(planned: AnyPlan, viewer: str) -> AbstractContextManager[Watch]:
+    """Return a context with a watcher that shows a run in a viewer."""
+    from fivebar_sim.recording import live
+    from fivebar_sim.walking import live as live_robots
+    from fivebar_sim.walking.plan import RobotPlan
+
+    if isinstance(planned, RobotPlan):
+        return live_robots.streaming(planned, viewer)
+    return live.streaming(planned, viewer)
 
 
 def _run(

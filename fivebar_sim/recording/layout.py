@@ -23,7 +23,10 @@ SUMMARY = "summary"
 
 
 def contents(
-    stage: Room, looks: Sequence[Look], plots: Sequence[Sequence[Series]]
+    stage: Room,
+    looks: Sequence[Look],
+    plots: Sequence[Sequence[Series]],
+    follow: str | None = None,
 ) -> rrb.Container:
     """Return the views of all runs.
 
@@ -31,6 +34,7 @@ def contents(
         stage: The space that the legs need.
         looks: The look of each run.
         plots: The plots of each run.
+        follow: The entity that the camera follows; None: it stands still.
     """
     import rerun.blueprint as rrb
 
@@ -40,11 +44,11 @@ def contents(
         first.setdefault(each.plot, each)
     views = [plot_view(plot, looks) for plot in first.values()]
     text = rrb.TextDocumentView(origin=SUMMARY, name="Verdict")
-    left = rrb.Vertical(leg_view(stage, looks), text, row_shares=[3, 2])
+    left = rrb.Vertical(leg_view(stage, looks, follow), text, row_shares=[3, 2])
     return rrb.Horizontal(left, rrb.Grid(*views, grid_columns=2), column_shares=[2, 3])
 
 
-def leg_view(stage: Room, looks: Sequence[Look]) -> rrb.Spatial3DView:
+def leg_view(stage: Room, looks: Sequence[Look], follow: str | None = None) -> rrb.Spatial3DView:
     """Return the 3D view: from the front, slightly above, all of the motion in sight."""
     import rerun.blueprint as rrb
 
@@ -66,7 +70,9 @@ def leg_view(stage: Room, looks: Sequence[Look]) -> rrb.Spatial3DView:
         name="Leg",
         background=[*BACKGROUND, 255],
         eye_controls=rrb.EyeControls3D(
-            position=centre + distance * np.array([0.25, -1.0, 0.25]), look_target=centre
+            position=centre + distance * np.array([0.25, -1.0, 0.25]),
+            look_target=centre,
+            tracking_entity=follow,
         ),
         line_grid=False,
         overrides=trails,

@@ -9,8 +9,8 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import AbstractContextManager, contextmanager, suppress
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -21,7 +21,7 @@ from fivebar_sim.recording import leg as scene
 from fivebar_sim.recording import viewer as recording_viewer
 from fivebar_sim.recording.look import Look
 from fivebar_sim.recording.plots import Series, series
-from fivebar_sim.recording.poses import DrawnMotion, Room, drawn_motion, room_of
+from fivebar_sim.recording.poses import DrawnMotion, Room, Rows, drawn_motion, room_of
 from fivebar_sim.recording.relay import Relay
 from fivebar_sim.recording.summary import colours
 from fivebar_sim.scenario.scenes import Ground
@@ -50,10 +50,12 @@ STALLED = 3.0
 FOREVER = 1e6
 """Longer than any viewer takes [s]: it is `finish` that gives up."""
 
+Begin = Callable[["rr.RecordingStream"], Watch]
+"""Returns what sends the states of some steps to a new recording."""
 
-@contextmanager
-def streaming(planned: Plan, address: str) -> Iterator[Watch]:
-    """Yield a watcher for `rollout.execute` that shows the run in a listening viewer.
+
+def streaming(planned: Plan, address: str) -> AbstractContextManager[Watch]:
+    """Return a context with a watcher for `rollout.execute` that shows a leg's run in a viewer.
 
     Args:
         planned: The plan that will be simulated.
@@ -62,11 +64,26 @@ def streaming(planned: Plan, address: str) -> Iterator[Watch]:
     Raises:
         RerunDisabledError: The environment variable RERUN switches Rerun off.
     """
+    return sending(planned.scenario.name, address, lambda stream: _Leg(planned, stream).send)
+
+
+@contextmanager
+def sending(name: str, address: str, begin: Begin) -> Iterator[Watch]:
+    """Yield a watcher that has a run shown in a listening viewer.
+
+    Args:
+        name: The recording's name.
+        address: HOST:PORT of the viewer.
+        begin: Says how states are shown; they are sent from a second thread.
+
+    Raises:
+        RerunDisabledError: The environment variable RERUN switches Rerun off.
+    """
     # The relay is left first: Rerun's own clean-up would wait for a viewer that does not read.
     with rrd.session(), Relay(address) as relay:
-        stream = rrd.started(planned.scenario.name)
+        stream = rrd.started(name)
         stream.connect_grpc(f"rerun+http://{relay.address}/proxy")
-        sender = _Sender(planned, stream)
+        sender = _Sender(begin(stream), stream)
         # Python's own interval is ten times as long: so long the sender would hold up the physics.
         before = sys.getswitchinterval()
         sys.setswitchinterval(SWITCH)
@@ -142,12 +159,9 @@ def spawn_viewer() -> str:
 class _Sender:
     """Sends states from its own thread, so that the physics does not wait."""
 
-    def __init__(self, planned: Plan, stream: rr.RecordingStream) -> None:
-        self._planned = planned
+    def __init__(self, send: Watch, stream: rr.RecordingStream) -> None:
+        self._send = send
         self._stream = stream
-        self._room = _room(planned)
-        self._begin = 0
-        self._before = planned.start
         self._queue: queue.SimpleQueue[States | None] = queue.SimpleQueue()
         self._error: Exception | None = None
         self._gone = False
@@ -197,7 +211,19 @@ class _Sender:
             self._stream.flush(timeout_sec=FOREVER)
             self._stream.disconnect()
 
-    def _send(self, states: States) -> None:
+
+class _Leg:
+    """A leg's run as it is shown so far."""
+
+    def __init__(self, planned: Plan, stream: rr.RecordingStream) -> None:
+        self._planned = planned
+        self._stream = stream
+        self._room = _room(planned)
+        self._has_begun = False
+        self._begin = 0
+        self._before = planned.start
+
+    def send(self, states: States) -> None:
         """Send some steps."""
         part = Part(states, self._begin, self._before)
         record = columns(self._planned, part, points(self._planned, part))
@@ -213,41 +239,62 @@ class _Sender:
         stream = self._stream
         look = Look()
         leg = planned.scenario.leg
-        h = planned.motion.timestep
         plots = list(series(planned.scenario, record))
 
-        if self._begin == 0:
+        if not self._has_begun:
             self._begin_recording(plots, look)
+            self._has_begun = True
 
-        rows = np.arange(0, len(record["time"]), max(1, round(1.0 / (RATE * h))))
+        rows = shown_rows(len(record["time"]), planned.motion.timestep)
         moved = drawn_motion(record, rows)
         at = rrd.times(record["time"][rows], self._begin + rows + 1)
         scene.send_leg(stream, leg, moved, look, at)
         foot.send_foot(stream, leg, moved, look, at)
         ground.send_ground(stream, leg, moved, look, at, self._room)
-
-        for plot in plots:
-            shown = plot.shown[rows]
-            # `values` has rows only where `shown` is true: the running count is their index.
-            values = plot.values[(np.cumsum(plot.shown) - 1)[rows[shown]]]
-            rrd.send_series(stream, plot._replace(values=values, shown=shown), look, at)
+        send_plots(stream, plots, rows, look, at)
 
     def _begin_recording(self, plots: list[Series], look: Look) -> None:
         planned = self._planned
         stream = self._stream
         layout.send(stream, layout.contents(self._room, [look], [plots]))
         rrd.log_room(stream, self._room)
-        text = f"# {planned.scenario.name}\n\nNo verdict yet: shown while it is simulated."
-        text = f"{text}\n\n{colours([planned.scenario.name])}\n"
-        stream.log(layout.SUMMARY, _markdown(text), static=True)
+        log_summary(stream, planned.scenario.name)
         scene.log_leg(stream, planned.scenario.leg, look)
         foot.log_foot(stream, planned.motion.foot[1:], look)
 
 
-def _markdown(text: str) -> rr.TextDocument:
+def shown_rows(count: int, timestep: float) -> Rows:
+    """Return which of some steps are shown: the first, and `RATE` each second of the run.
+
+    Args:
+        count: Number of steps.
+        timestep: h [s].
+    """
+    return np.arange(0, count, max(1, round(1.0 / (RATE * timestep))))
+
+
+def log_summary(stream: rr.RecordingStream, name: str) -> None:
+    """Log what there is to say of a run that is not over."""
     import rerun as rr
 
-    return rr.TextDocument(text, media_type="text/markdown")
+    text = f"# {name}\n\nNo verdict yet: shown while it is simulated.\n\n{colours([name])}\n"
+    document = rr.TextDocument(text, media_type="text/markdown")
+    stream.log(layout.SUMMARY, document, static=True)
+
+
+def send_plots(
+    stream: rr.RecordingStream,
+    plots: Sequence[Series],
+    rows: Rows,
+    look: Look,
+    at: list[rr.TimeColumn],
+) -> None:
+    """Send some rows of plots, whose times are given."""
+    for plot in plots:
+        shown = plot.shown[rows]
+        # `values` has rows only where `shown` is true: the running count is their index.
+        values = plot.values[(np.cumsum(plot.shown) - 1)[rows[shown]]]
+        rrd.send_series(stream, plot._replace(values=values, shown=shown), look, at)
 
 
 def _room(planned: Plan) -> Room:

@@ -6,10 +6,10 @@ Rerun is slow to import: only the functions that use it do.
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -20,7 +20,7 @@ from fivebar_sim.recording import leg as legs
 from fivebar_sim.recording.check import PROPERTY
 from fivebar_sim.recording.look import GREY, Colour, Look, looks, shade
 from fivebar_sim.recording.plots import Series
-from fivebar_sim.recording.poses import Room, Rows, drawn_motion, drawn_rows
+from fivebar_sim.recording.poses import Room, Rows, drawn_motion, drawn_rows, points
 from fivebar_sim.recording.summary import summary
 from fivebar_sim.render import palette
 from fivebar_sim.robots import LEGS, Floor, Robot, places
@@ -45,6 +45,18 @@ COLOURS: dict[str, Colour] = {
 
 TURNED = (0.0, 0.0, 1.0, 0.0)
 """Half a turn about z, as a quaternion (x, y, z, w)."""
+
+
+class Drawn(NamedTuple):
+    """The rows of a record that are drawn.
+
+    Attributes:
+        rows: Those rows.
+        times: Their times.
+    """
+
+    rows: Rows
+    times: list[rr.TimeColumn]
 
 
 def write(path: Path, runs: Sequence[Run], labels: Sequence[str] = ()) -> None:
@@ -87,20 +99,43 @@ def _robot(run: Run) -> Robot:
 
 
 def _send_run(stream: rr.RecordingStream, run: Run, look: Look, room: Room) -> None:
-    """Send one run: the robot's numbers and its motion, its ground, and the floor's forces."""
+    """Send one run: the robot's numbers, what stands still, and what moves."""
     import rerun as rr
 
     robot = _robot(run)
-    scene = run.scenario.scene
-    if isinstance(scene, Floor) and not scene.ground.level:
-        recorded_ground.log(stream, room, scene.ground, look.root)
-    time = run.record["time"]
-    rows = drawn_rows(time)
-    drawn = rrd.times(time[rows], rows + 1)
+    rows = drawn_rows(run.record["time"])
     # As JSON, since a plain value keeps the type that it first had.
     stream.send_property(f"{look.root}leg", rr.AnyValues(json=json.dumps(asdict(robot.leg))))
     own = identity(run.scenario, run.record, run.measured)
     stream.send_property(f"{look.root}{PROPERTY}", rr.AnyValues(sha256=own))
+
+    targets = {leg: points(of_leg(run.record, leg), "target")[rows] for leg in LEGS}
+    scene = run.scenario.scene
+    if isinstance(scene, Floor) and not scene.ground.level:
+        recorded_ground.log(stream, room, scene.ground, look.root)
+    log_still(stream, robot, targets, look, on_floor=isinstance(scene, Floor))
+    drawn = Drawn(rows, rrd.times(run.record["time"][rows], rows + 1))
+    send_moving(stream, robot, run.record, drawn, look, room)
+
+
+def log_still(
+    stream: rr.RecordingStream,
+    robot: Robot,
+    targets: Mapping[str, Array],
+    look: Look,
+    *,
+    on_floor: bool,
+) -> None:
+    """Log what does not move: the trunk and the legs in their own frames.
+
+    Args:
+        stream: The recording.
+        robot: The robot.
+        targets: Where each leg's foot should be at one time or another, hip frame [m], (n, 2).
+        look: How the run looks.
+        on_floor: Whether its feet may touch a floor.
+    """
+    import rerun as rr
 
     box = rr.Boxes3D(
         centers=[robot.trunk.center],
@@ -110,92 +145,99 @@ def _send_run(stream: rr.RecordingStream, run: Run, look: Look, room: Room) -> N
         fill_mode="majorwireframe",
     )
     stream.log(f"{look.root}{TRUNK}", box, static=True)
-    body = trunk(run.record)
+
+    for name in LEGS:
+        hip = robot.hips[name]
+        root = f"{look.root}{TRUNK}/{name}"
+        if not hip.motors:
+            facing = rr.Quaternion(xyzw=TURNED if hip.mirrored else (0.0, 0.0, 0.0, 1.0))
+            fixed = rr.Transform3D(translation=hip.pos, quaternion=facing)
+            stream.log(root, fixed, static=True)
+        legs.log_leg(stream, robot.leg, _of_leg(look, name))
+        path = rr.LineStrips3D(
+            [legs.in_space(targets[name])],
+            radii=rr.Radius.ui_points(1.0),
+            colors=[look.colour(shade("target"))],
+        )
+        stream.log(f"{root}/{foot.TARGET_PATH}", path, static=True)
+        if on_floor:
+            arrow = rr.Arrows3D.from_fields(
+                radii=[0.3 * robot.leg.radius], colors=[look.colour(shade("force"))]
+            )
+            stream.log(_force(look, name), arrow, static=True)
+
+
+def _of_leg(look: Look, name: str) -> Look:
+    """Return how one leg of a run looks."""
+    return look._replace(root=f"{look.root}{TRUNK}/{name}/", label=look.label and name)
+
+
+def _force(look: Look, name: str) -> str:
+    """Return the entity of the floor's force on a leg's foot."""
+    return f"{look.root}ground_force/{name}"
+
+
+def send_moving(
+    stream: rr.RecordingStream, robot: Robot, record: Record, drawn: Drawn, look: Look, room: Room
+) -> None:
+    """Send what moves, in some rows of a record: trunk, legs, the floor's forces."""
+    import rerun as rr
+
+    rows = drawn.rows
+    body = trunk(record)
     if body is not None:
         facing = body.quaternion[rows][:, [1, 2, 3, 0]]
         poses = rr.Transform3D.columns(translation=body.position[rows], quaternion=facing)
-        stream.send_columns(f"{look.root}{TRUNK}", drawn, poses)
+        stream.send_columns(f"{look.root}{TRUNK}", drawn.times, poses)
     for name in LEGS:
-        _send_leg(stream, run, name, look, drawn, rows)
+        own = of_leg(record, name)
+        _send_leg(stream, robot, name, own, drawn, look)
         if body is not None:
-            _send_force(stream, run, name, look, drawn, rows, room)
+            seen = Trunk(*(each[rows] for each in body))
+            shown = {key: column[rows] for key, column in own.items()}
+            arrows = _forces(robot, name, seen, shown, room)
+            stream.send_columns(_force(look, name), drawn.times, arrows)
 
 
 def _send_leg(
-    stream: rr.RecordingStream,
-    run: Run,
-    name: str,
-    look: Look,
-    drawn: list[rr.TimeColumn],
-    rows: Rows,
+    stream: rr.RecordingStream, robot: Robot, name: str, record: Record, drawn: Drawn, look: Look
 ) -> None:
-    """Send one leg, in the trunk's frame, and where its foot should be."""
+    """Send one leg, in the trunk's frame."""
     import rerun as rr
 
-    robot = _robot(run)
     hip = robot.hips[name]
-    root = f"{look.root}{TRUNK}/{name}"
-    fixed = rr.Transform3D(
-        translation=hip.pos,
-        quaternion=rr.Quaternion(xyzw=TURNED if hip.mirrored else (0.0, 0.0, 0.0, 1.0)),
-    )
-    record = of_leg(run.record, name)
-    if not hip.motors:
-        stream.log(root, fixed, static=True)
-    else:
-        turns = turned.angles(hip, record)[rows]
+    own = _of_leg(look, name)
+    if hip.motors:
+        turns = turned.angles(hip, record)[drawn.rows]
         origin = turned.in_trunk(hip, np.zeros((len(turns), 2)), turns)
         frames = rr.Transform3D.columns(
             translation=origin, quaternion=turned.quaternion(hip, turns)[:, [1, 2, 3, 0]]
         )
-        stream.send_columns(root, drawn, frames)
+        stream.send_columns(own.root.removesuffix("/"), drawn.times, frames)
     # Without the ground: the hip hangs on the trunk, not on a rail.
-    moved = drawn_motion(_in_air(record), rows)
-    own = look._replace(root=f"{root}/", label=look.label and name)
-    legs.log_leg(stream, robot.leg, own)
-    legs.send_leg(stream, robot.leg, moved, own, drawn)
-    path = rr.LineStrips3D(
-        [legs.in_space(moved.target)],
-        radii=rr.Radius.ui_points(1.0),
-        colors=[look.colour(shade("target"))],
-    )
-    stream.log(f"{root}/{foot.TARGET_PATH}", path, static=True)
+    moved = drawn_motion(_in_air(record), drawn.rows)
+    legs.send_leg(stream, robot.leg, moved, own, drawn.times)
 
 
 def _in_air(record: Record) -> Record:
     return {name: column for name, column in record.items() if not name.startswith("ground")}
 
 
-def _send_force(
-    stream: rr.RecordingStream,
-    run: Run,
-    name: str,
-    look: Look,
-    drawn: list[rr.TimeColumn],
-    rows: Rows,
-    room: Room,
-) -> None:
-    """Send the floor's force on a foot as an arrow, hidden while the foot is in the air."""
+def _forces(
+    robot: Robot, name: str, body: Trunk, record: Record, room: Room
+) -> rr.ComponentColumnList:
+    """Return the floor's forces on a foot as arrows, hidden while the foot is in the air."""
     import rerun as rr
 
-    robot = _robot(run)
-    body = trunk(run.record)
-    assert body is not None
-    record = {key: column[rows] for key, column in of_leg(run.record, name).items()}
     force = np.stack([record[f"ground_{axis}"] for axis in "xyz"], axis=-1)
-    place = places.feet(Trunk(*(each[rows] for each in body)), robot.hips[name], record)
+    place = places.feet(body, robot.hips[name], record)
     down = force[:, 2] > 0.0
-    entity = f"{look.root}ground_force/{name}"
-    arrow = rr.Arrows3D.from_fields(
-        radii=[0.3 * robot.leg.radius], colors=[look.colour(shade("force"))]
-    )
-    stream.log(entity, arrow, static=True)
     arrows = rr.Arrows3D.columns(
         origins=place[down] - np.array([0.0, 0.0, robot.leg.foot_radius]),
         vectors=room.metre_per_newton * force[down],
     )
     # Rows in the air get an empty batch: without one the last arrow would stay in sight.
-    stream.send_columns(entity, drawn, arrows.partition(down.astype(np.intp)))
+    return arrows.partition(down.astype(np.intp))
 
 
 def series(record: Record) -> Iterator[Series]:
