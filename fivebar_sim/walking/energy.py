@@ -14,9 +14,10 @@ from fivebar_sim.arrays import Array
 from fivebar_sim.metrics.columns import motors
 from fivebar_sim.metrics.energy import STILL, Balance
 from fivebar_sim.robots import LEGS, Floor
-from fivebar_sim.robots.columns import FORCE_COLUMNS, of_leg
+from fivebar_sim.robots.columns import of_leg
 from fivebar_sim.robots.floor import load
 from fivebar_sim.robots.hips.motors import column
+from fivebar_sim.walking.poses import Pose, Poses
 from fivebar_sim.walking.record import before, wrench
 from fivebar_sim.walking.walk import Walk
 
@@ -31,9 +32,9 @@ def balance(went: Walk) -> Balance:
     h = planned.sim.timestep
     v = went.states.qvel[0]
     w = 0.5 * (before(np.zeros(v.shape[1]), v) + v)
-    meter = _Meter(went)
+    meter = _Meter(went, w)
     kinetic, potential = meter.energies()
-    ground = meter.ground(w) if isinstance(planned.scene, Floor) else np.zeros(len(v))
+    given_away, pushed, ground = meter.works()
     torque = np.concatenate([motors(of_leg(went.record, leg), "torque") for leg in LEGS], axis=1)
     own = _motors(planned.model)
     turning = w[:, own]
@@ -54,10 +55,10 @@ def balance(went: Walk) -> Balance:
     )
     return Balance(
         motor=h * motor,
-        force=h * meter.pushed(w),
+        force=pushed,
         ground=ground,
         constraints=h * np.sum(constraint * w, axis=1) - ground,
-        step=h * meter.given_away(w),
+        step=given_away,
         kinetic=np.diff(kinetic),
         potential=np.diff(potential),
         moved=bool(moved),
@@ -77,15 +78,17 @@ class _Meter:
 
     Args:
         went: What the robot did.
+        w: Rates in the middle of each step, (N, nv).
     """
 
-    def __init__(self, went: Walk) -> None:
-        self._model = went.plan.model
-        self._data = mujoco.MjData(self._model)
+    def __init__(self, went: Walk, w: Array) -> None:
         self._went = went
+        self._model = went.plan.model
+        self._w = w
         self._q = np.concatenate([went.plan.start[None], went.states.qpos[0]])
         v = went.states.qvel[0]
         self._v = np.concatenate([np.zeros((1, v.shape[1])), v])
+        self._poses = Poses(self._model)
 
     def energies(self) -> tuple[Array, Array]:
         """Return kinetic and potential energy before the first step and after each [J], (N + 1,).
@@ -93,108 +96,71 @@ class _Meter:
         Rates belong to the middle of the step that they moved the robot by.
         """
         model = self._model
-        data = self._data
         h = self._went.plan.sim.timestep
-        found = np.empty((2, len(self._q)))
+        middle = self._q.copy()
+        for q, v in zip(middle, self._v, strict=True):
+            mujoco.mj_integratePos(model, q, v, -0.5 * h)
 
-        for k, (q, v) in enumerate(zip(self._q, self._v, strict=True)):
-            data.qpos[:] = q
-            mujoco.mj_integratePos(model, data.qpos, v, -0.5 * h)
-            data.qvel[:] = v
-            # What the energies need of `mj_forward`, and no more.
-            mujoco.mj_kinematics(model, data)
-            mujoco.mj_comPos(model, data)
-            mujoco.mj_crb(model, data)
-            mujoco.mj_energyVel(model, data)
-            found[0, k] = data.energy[1]
-            found[1, k] = -float(model.body_mass @ (data.xipos @ model.opt.gravity))
+        found = np.empty((2, len(middle)))
+        for rows, at in self._poses.blocks(middle, self._v):
+            found[0, rows] = at.kinetic
+            heights = at.centers @ model.opt.gravity
+            found[1, rows] = -np.sum(model.body_mass * heights, axis=1)
         return found[0], found[1]
 
-    def given_away(self, w: Array) -> Array:
-        """Return -(c(q, v) - c(q, w)) . w of every step [W], v the rates at its start, (N,)."""
-        model = self._model
-        data = self._data
-        start = np.empty(model.nv)
-        meant = np.empty(model.nv)
-        found = np.empty(len(w))
+    def works(self) -> tuple[Array, Array, Array]:
+        """Return what the steps give away, and the works of pushes and floor in each [J], (N,).
 
-        for k, rates in enumerate(w):
-            data.qpos[:] = self._q[k]
-            mujoco.mj_kinematics(model, data)
-            mujoco.mj_comPos(model, data)
-            # Gravity is in both, and goes out in the difference.
-            for v, c in ((self._v[k], start), (rates, meant)):
-                data.qvel[:] = v
-                mujoco.mj_comVel(model, data)
-                mujoco.mj_rne(model, data, 0, c)
-            found[k] = -float((start - meant) @ rates)
-        return found
-
-    def pushed(self, w: Array) -> Array:
-        """Return the power of the pushes on the trunk in every step [W], (N,)."""
-        model = self._model
-        data = self._data
-        pushes = self._went.plan.pushes
-        jac = np.empty((3, model.nv))
-        found = np.zeros(len(w))
-
-        for k in np.flatnonzero(pushes.any(axis=1)):
-            data.qpos[:] = self._q[k]
-            mujoco.mj_kinematics(model, data)
-            mujoco.mj_comPos(model, data)
-            for i, force in enumerate(pushes[k].reshape(-1, 3)):
-                mujoco.mj_jacSite(model, data, jac, None, model.site(f"push_{i}").id)
-                found[k] += float(force @ (jac @ w[k]))
-        return found
-
-    def ground(self, w: Array) -> Array:
-        """Return the work of the floor on all feet in every step [J], (N,)."""
-        model = self._model
-        data = self._data
+        A step gives away -h (c(q, v) - c(q, w)) . w, v the rates at its start.
+        """
+        w = self._w
         h = self._went.plan.sim.timestep
-        record = self._went.record
-        if self._went.depths is not None:
-            return self._uneven(w)
-        force = np.stack(
-            [np.stack([record[f"{leg}_{c}"] for c in FORCE_COLUMNS], axis=-1) for leg in LEGS],
-            axis=1,
-        )
-        geoms = [model.geom(f"{leg}_foot").id for leg in LEGS]
-        jac = np.empty((3, model.nv))
-        found = np.zeros(len(w))
-        for k in np.flatnonzero(force.any(axis=(1, 2))):
-            data.qpos[:] = self._q[k]
-            mujoco.mj_kinematics(model, data)
-            mujoco.mj_comPos(model, data)
-            for foot, geom in zip(force[k], geoms, strict=True):
-                if not foot.any():
-                    continue
-                point = data.geom_xpos[geom].copy()
+        start = self._q[:-1]
+        turning = np.empty_like(w)
+        for rows, at in self._poses.blocks(start, self._v[:-1]):
+            turning[rows] = at.bias
+
+        found = np.empty((3, len(w)))
+        for rows, at in self._poses.blocks(start, w):
+            found[0, rows] = -np.sum((turning[rows] - at.bias) * w[rows], axis=1)
+            found[1, rows] = self._pushed(at, rows)
+            found[2, rows] = self._ground(at, rows)
+        found *= h
+        return found[0], found[1], found[2]
+
+    def _pushed(self, at: Pose, rows: slice) -> Array:
+        """Return the power of the pushes on the trunk in some steps [W], (n,)."""
+        pushes = self._went.plan.pushes[rows]
+        power = np.zeros(len(pushes))
+        if not pushes.any():
+            return power
+
+        for i, force in enumerate(np.split(pushes, pushes.shape[1] // 3, axis=1)):
+            site = self._model.site(f"push_{i}").id
+            body = int(self._model.site_bodyid[site])
+            power += np.sum(force * at.velocity(body, at.sites[:, site]), axis=1)
+        return power
+
+    def _ground(self, at: Pose, rows: slice) -> Array:
+        """Return the power of the floor on all feet in some steps [W], (n,)."""
+        went = self._went
+        model = self._model
+        power = np.zeros(rows.stop - rows.start)
+        if not isinstance(went.plan.scene, Floor):
+            return power
+
+        for k, leg in enumerate(LEGS):
+            foot = model.geom(f"{leg}_foot").id
+            body = int(model.geom_bodyid[foot])
+            acting = wrench(went.states, k)[rows]
+            if went.depths is not None:
+                # Uneven ground tells its force's place, and a torque about it.
+                power += np.sum(acting[:, 3:6] * at.turning(body), axis=1)
+                point = acting[:, 6:]
+            else:
+                point = at.geoms[:, foot].copy()
                 # MuJoCo puts the contact in the middle of the overlap with the floor.
-                point[2] = 0.5 * (point[2] - model.geom_size[geom, 0])
-                mujoco.mj_jac(model, data, jac, None, point, int(model.geom_bodyid[geom]))
-                found[k] += h * float(foot @ (jac @ w[k]))
-        return found
-
-    def _uneven(self, w: Array) -> Array:
-        """Return the work of uneven ground, whose force is known with its torque and place [J]."""
-        model = self._model
-        data = self._data
-        h = self._went.plan.sim.timestep
-        wrenches = np.stack([wrench(self._went.states, k) for k in range(len(LEGS))], axis=1)
-        bodies = [int(model.geom_bodyid[model.geom(f"{leg}_foot").id]) for leg in LEGS]
-        moves = np.empty((3, model.nv))
-        turns = np.empty((3, model.nv))
-        found = np.zeros(len(w))
-
-        for k in np.flatnonzero(wrenches[..., :3].any(axis=(1, 2))):
-            data.qpos[:] = self._q[k]
-            mujoco.mj_kinematics(model, data)
-            mujoco.mj_comPos(model, data)
-            for acting, body in zip(wrenches[k], bodies, strict=True):
-                if not acting[:3].any():
-                    continue
-                mujoco.mj_jac(model, data, moves, turns, acting[6:], body)
-                power = acting[:3] @ (moves @ w[k]) + acting[3:6] @ (turns @ w[k])
-                found[k] += h * float(power)
-        return found
+                point[:, 2] = 0.5 * (point[:, 2] - model.geom_size[foot, 0])
+            force = acting[:, :3]
+            power += np.sum(force * at.velocity(body, point), axis=1)
+        return power
