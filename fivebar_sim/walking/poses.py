@@ -56,8 +56,11 @@ class Pose(NamedTuple):
 
     def velocity(self, body: int, point: Array) -> Array:
         """Return the velocity of a point of a body [m/s], (n, 3)."""
-        lever = point - self.about[:, int(self.root[body])]
-        return self.rates[:, body, 3:] + np.cross(self.turning(body), lever)
+        rx, ry, rz = (point - self.about[:, int(self.root[body])]).T
+        wx, wy, wz = self.turning(body).T
+        # np.cross takes four times as long.
+        turned = np.stack([wy * rz - wz * ry, wz * rx - wx * rz, wx * ry - wy * rx], axis=1)
+        return self.rates[:, body, 3:] + turned
 
 
 class Poses:

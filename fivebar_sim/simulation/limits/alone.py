@@ -17,8 +17,11 @@ from mujoco.batch import Batch
 
 from fivebar_sim.arrays import Array
 from fivebar_sim.simulation.limits.clipping import MOST_MODES, Clipping, settle
-from fivebar_sim.simulation.limits.limited import ITERATIONS, STATE, UNSOLVED, WARMSTART
+from fivebar_sim.simulation.limits.limited import ITERATIONS, STATE, UNSOLVED
 from fivebar_sim.simulation.limits.servos import Servos
+
+KEPT = STATE.value | mujoco.mjtState.mjSTATE_WARMSTART.value
+"""What a step begins with: as STATE, and behind it where the solver starts."""
 
 WHOLE = mujoco.mjtState.mjSTATE_INTEGRATION
 """All that the next step depends on."""
@@ -53,7 +56,6 @@ class Alone:
         self.qvel = self._data.qvel[None]
         self.warning = batch.warning.copy()
 
-        self._warm = self._data.qacc_warmstart
         self._warnings = self._data.warning.number
         self._servos = None if clipping is None else Servos(clipping, self._data)
         self._right = BEGIN
@@ -100,8 +102,7 @@ class Alone:
         """Take the steps from k on with commands (1, n, nu), and return how many are right."""
         length = ctrl.shape[1]
         mujoco.mj_getState(self._model, self._data, self._batch.state[0], WHOLE)
-        out = {item: each[:, k : k + length] for item, each in rows.arrays.items()}
-        out[WARMSTART] = np.empty((1, length, len(self._warm)))
+        out = {item: each[:, k : k + length] for item, each in rows.recorded.items()}
         warned = self._batch.warning.copy()
         self._batch.rollout(length, ctrl, record=tuple(out), out=out)
 
@@ -110,12 +111,12 @@ class Alone:
             self._right = 0
             return 0
 
-        states = np.concatenate([rows.before(k)[None, None], out[STATE]], axis=1)
+        states = np.concatenate([rows.before(k)[None, None], out[KEPT]], axis=1)
         wrong = servos.wrong(ctrl, states[:, :-1], states[:, 1:])
         good = int(wrong.argmax()) if wrong.any() else length
         self._right = 0 if good < length else self._right + length
         if good:
-            self._put_back(states[0, good], out[WARMSTART][0, good - 1])
+            self._put_back(states[0, good])
         return good
 
     def _limited(self, servos: Servos, ctrl: Array, rows: _Rows, k: int) -> bool:
@@ -124,7 +125,6 @@ class Alone:
         Returns:
             Whether its torques were found.
         """
-        warm = self._warm.copy()
         warned = self._warnings.tolist()
         self._data.ctrl[:] = ctrl
         servos.begin(ctrl[servos.own].tolist())
@@ -136,22 +136,21 @@ class Alone:
         self._right = 0
         # Warnings of a step that is thrown away do not count.
         self._warnings[:] = warned
-        return self._retake(servos, rows.before(k), warm)
+        return self._retake(servos, rows.before(k))
 
-    def _retake(self, servos: Servos, before: Array, warm: Array) -> bool:
+    def _retake(self, servos: Servos, before: Array) -> bool:
         """Take a step again, that was just taken, until its modes agree with its end.
 
         Args:
             servos: The servos.
-            before: The state before it: time, qpos and qvel.
-            warm: Where its solver starts.
+            before: The state before it.
 
         Returns:
             Whether its torques were found.
         """
 
         def again() -> None:
-            self._put_back(before, warm)
+            self._put_back(before)
             mujoco.mj_step(self._model, self._data)
             servos.release()
 
@@ -176,10 +175,8 @@ class Alone:
             modes = next(left, modes) if asked in tried else asked
         return settle(ended, servos.limit)
 
-    def _put_back(self, state: Array, warm: Array) -> None:
-        """Put it into another state: time, qpos and qvel, and where the solver starts."""
-        mujoco.mj_setState(self._model, self._data, state, STATE)
-        self._warm[:] = warm
+    def _put_back(self, state: Array) -> None:
+        mujoco.mj_setState(self._model, self._data, state, KEPT)
 
 
 class _Rows:
@@ -192,7 +189,7 @@ class _Rows:
         steps: How many steps.
 
     Attributes:
-        arrays: Of each item, (1, steps, ...).
+        recorded: Of each item, (1, steps, ...); of the state, `KEPT`.
     """
 
     def __init__(
@@ -200,32 +197,39 @@ class _Rows:
     ) -> None:
         self._model = model
         self._data = data
-        self._start = np.empty(mujoco.mj_stateSize(model, STATE))
-        mujoco.mj_getState(model, data, self._start, STATE)
-
-        fields = [item for item in dict.fromkeys([*record, ITERATIONS]) if item != STATE]
-        live = {item: getattr(data, item) for item in fields}
+        self._start = np.empty(mujoco.mj_stateSize(model, KEPT))
+        mujoco.mj_getState(model, data, self._start, KEPT)
         self._states = np.empty((steps, len(self._start)))
-        self.arrays: dict[Any, Array] = {STATE: self._states[None]}
-        self.arrays |= {
-            item: np.empty((1, steps, *now.shape), now.dtype) for item, now in live.items()
-        }
-        self._pairs = [(self.arrays[item][0], now) for item, now in live.items()]
+
+        self.recorded: dict[Any, Array] = {KEPT: self._states[None]}
+        self._pairs: list[tuple[Array, Array]] = []
+        for item in dict.fromkeys([*record, ITERATIONS]):
+            if item != STATE:
+                now = getattr(data, item)
+                kept = np.empty((1, steps, *now.shape), now.dtype)
+                self.recorded[item] = kept
+                self._pairs.append((kept[0], now))
+
+    @property
+    def arrays(self) -> dict[Any, Array]:
+        """Of each item that was to be recorded, (1, steps, ...)."""
+        state = self._states[None, :, : mujoco.mj_stateSize(self._model, STATE)]
+        return {STATE: state} | self.recorded
 
     def keep(self, k: int, *, solved: bool) -> None:
         """Keep what MuJoCo has after step k."""
-        mujoco.mj_getState(self._model, self._data, self._states[k], STATE)
+        mujoco.mj_getState(self._model, self._data, self._states[k], KEPT)
         for kept, now in self._pairs:
             kept[k] = now
         if not solved:
             # Nothing else is known of this step than that its equations are not solved.
-            self.arrays[ITERATIONS][0, k] = UNSOLVED
+            self.recorded[ITERATIONS][0, k] = UNSOLVED
 
     def repeat(self, count: int) -> None:
         """Repeat the last of some steps until the end."""
-        for each in self.arrays.values():
+        for each in self.recorded.values():
             each[:, count:] = each[:, count - 1 : count]
 
     def before(self, k: int) -> Array:
-        """Return the state before step k: time, qpos and qvel."""
+        """Return the state before step k, `KEPT`."""
         return self._states[k - 1] if k > 0 else self._start

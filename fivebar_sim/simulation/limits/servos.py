@@ -96,7 +96,7 @@ class Servos:
 
         Args:
             ctrl: Commands, (1, N, nu).
-            before: Time, qpos and qvel before each step, (1, N, 1 + nq + nv).
+            before: Time, qpos and qvel before each step, and more, (1, N, ...).
             after: And after it.
         """
         u = ctrl[..., self.own]
@@ -107,7 +107,9 @@ class Servos:
 
     def _motors(self, state: Array) -> tuple[Array, Array]:
         nq = len(self._qpos)
-        return state[..., 1 : 1 + nq][..., self._joints], state[..., 1 + nq :][..., self._joints]
+        q = state[..., 1 : 1 + nq]
+        v = state[..., 1 + nq : 1 + nq + len(self._qvel)]
+        return q[..., self._joints], v[..., self._joints]
 
     def _end(self) -> tuple[list[float], list[float]]:
         """Return the angles that the springs act with, and the rates after the step."""
