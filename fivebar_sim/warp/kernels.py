@@ -16,6 +16,12 @@ wp.set_module_options({"enable_backward": False})
 MOST_MODES = wp.constant(9)
 """Modes of two motors with three each."""
 
+NEVER = wp.constant(1e30)
+"""More than any torque misses its mode by [N m]."""
+
+SMALL = wp.constant(1e-3)
+"""Part of a limit by which a step's torques may miss it in single precision, at an impact."""
+
 
 @wp.kernel
 def next_step(step: wp.array[int]):
@@ -103,6 +109,15 @@ def ended(mode: int, asked: float, limit: float, slack: float):
     return side(asked + slack * float(mode), bound)
 
 
+@wp.func
+def missed(mode: int, asked: float, limit: float):
+    """Return how far a torque is from what its mode calls for."""
+    beyond = wp.abs(asked) - limit
+    if mode != 0:
+        beyond = limit - asked * float(mode)
+    return wp.max(beyond, 0.0)
+
+
 @wp.kernel
 def begin(
     ctrl: wp.array2d[float],
@@ -114,6 +129,7 @@ def begin(
     modes: wp.array2d[int],
     tried: wp.array[int],
     wrong: wp.array[int],
+    least: wp.array[float],
 ):
     """Find the modes that MuJoCo chooses for a step by its start; arguments as in `judge`."""
     leg = wp.tid()
@@ -125,6 +141,7 @@ def begin(
         asked = kp[leg, motor] * off - kd[leg, motor] * before_v[leg, nv - 4 + 2 * motor]
         modes[leg, motor] = side(asked, limit[leg, motor])
     tried[leg] = 0
+    least[leg] = NEVER
     # Until it is judged.
     wrong[leg] = 1
 
@@ -145,14 +162,17 @@ def judge(
     wanted: wp.array2d[int],
     tried: wp.array[int],
     wrong: wp.array[int],
+    least: wp.array[float],
+    best: wp.array[int],
     iterations: wp.array[int],
     unsolved: int,
     left: wp.array[int],
 ):
     """Find the legs whose motors ended the step in other modes than it was taken in.
 
-    Those are counted in `left`, with the modes to try next in `wanted`. One with no modes that
-    agree is marked by its number of iterations.
+    Those are counted in `left`, with the modes to try next in `wanted`. Where none agree, as
+    rounding has it at an impact, the step is taken once more in those that missed by the least;
+    one that they miss by more than `SMALL` of a limit is marked by its number of iterations.
 
     Args:
         late: Whether the spring acts at the end of a step, not at its start.
@@ -169,6 +189,8 @@ def judge(
         wanted: The modes to try next, (n, 2).
         tried: A bit for each pair of modes that was tried, (n,).
         wrong: Whether a leg's step was to be taken (again), and now whether it still is, (n,).
+        least: By how much its best modes so far miss their torques [N m], (n,).
+        best: The number of these modes, (n,).
         iterations: Of the solver, (n,).
         unsolved: Iterations that mark a leg without modes that agree.
         left: The number of legs whose step is wrong, (1,).
@@ -180,6 +202,8 @@ def judge(
     nq = qpos.shape[1]
     nv = qvel.shape[1]
     differs = int(0)
+    misses = float(0.0)
+    part = float(0.0)
     for motor in range(2):
         spring = before_q[leg, nq - 4 + 2 * motor]
         if late == 1:
@@ -191,18 +215,26 @@ def judge(
         wanted[leg, motor] = ended(mode, asked, limit[leg, motor], slack[leg, motor])
         if wanted[leg, motor] != mode:
             differs = 1
+            by = missed(mode, asked, limit[leg, motor])
+            misses = wp.max(misses, by)
+            part = wp.max(part, by / limit[leg, motor])
 
-    wrong[leg] = differs
-    if differs == 0:
-        return
-    so_far = tried[leg] | (1 << row(modes[leg, 0], modes[leg, 1]))
-    tried[leg] = so_far
-    if so_far == (1 << MOST_MODES) - 1:
+    present = row(modes[leg, 0], modes[leg, 1])
+    is_last = tried[leg] == (1 << MOST_MODES) - 1
+    if differs == 0 or is_last:
         wrong[leg] = 0
-        iterations[leg] = unsolved
+        if differs == 1 and part > SMALL:
+            iterations[leg] = unsolved
         return
 
-    number = untried(so_far, row(wanted[leg, 0], wanted[leg, 1]))
+    if misses < least[leg]:
+        least[leg] = misses
+        best[leg] = present
+    so_far = tried[leg] | (1 << present)
+    tried[leg] = so_far
+    number = best[leg]
+    if so_far != (1 << MOST_MODES) - 1:
+        number = untried(so_far, row(wanted[leg, 0], wanted[leg, 1]))
     wanted[leg, 0] = mode_of(number // 3)
     wanted[leg, 1] = mode_of(number % 3)
     wp.atomic_add(left, 0, 1)

@@ -19,7 +19,7 @@ ROUNDING = 5e-7
 """How far an angle may be rounded in a step [rad]: so much torque, times kp, is on the limit."""
 
 UNSOLVED = 1_000_000
-"""Iterations that stand for a step of whose modes none agree."""
+"""Iterations that stand for a step of whose modes none agree, not even about."""
 
 
 class Limits:
@@ -53,6 +53,8 @@ class Limits:
         self._wanted = wp.zeros(shape, dtype=int)
         self._tried = wp.zeros(len(kp), dtype=int)
         self._wrong = wp.zeros(len(kp), dtype=int)
+        self._least = wp.zeros(len(kp), dtype=float)
+        self._best = wp.zeros(len(kp), dtype=int)
         self._left = wp.zeros(1, dtype=int)
         self._graph: Any = None
 
@@ -70,7 +72,7 @@ class Limits:
             self._wp.copy(kept, now)
         self._data.qfrc_applied.zero_()
         inputs = [self._data.ctrl, *self._kept[:2], *self._gains]
-        outputs = [self._modes, self._tried, self._wrong]
+        outputs = [self._modes, self._tried, self._wrong, self._least]
         self._wp.launch(
             devices.kernels().begin, dim=self._data.nworld, inputs=inputs, outputs=outputs
         )
@@ -82,13 +84,14 @@ class Limits:
         states = [self._kept[0], data.qpos, data.qvel]
         modes = [self._modes, self._wanted, self._tried, self._wrong]
         numbers = [*self._gains, self._slack]
-        found = [data.solver_niter, UNSOLVED, self._left]
+        found = [self._least, self._best, data.solver_niter, UNSOLVED, self._left]
         inputs = [self._late, self._table, self._step, *states, *numbers, *modes, *found]
         self._wp.launch(devices.kernels().judge, dim=data.nworld, inputs=inputs)
 
     def settle(self) -> None:
         """Take the last step again, until the modes of every leg agree with its end."""
-        for _ in range(MOST_MODES):
+        # Each of the modes, and the best of them again.
+        for _ in range(MOST_MODES + 1):
             if not int(self._left.numpy()[0]):
                 return
             if self._graph is None:
