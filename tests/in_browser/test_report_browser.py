@@ -1,14 +1,8 @@
-"""A report in a browser: it loads nothing else, draws everything, and fits its window.
-
-Needs Chromium and Playwright's Python package; FIVEBAR_BROWSER=required makes their lack an error.
-"""
+"""A report in a browser: it loads nothing else, draws everything, and fits its window."""
 
 from __future__ import annotations
 
-import importlib.util
-import os
 import shutil
-from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
@@ -51,31 +45,6 @@ SEEN = """selector => {
     const style = getComputedStyle(document.querySelector(selector));
     return [style.color, style.stroke, style.backgroundColor];
 }"""
-
-
-def missing() -> str | None:
-    """Return what the browser's tests lack, or None."""
-    if importlib.util.find_spec("playwright") is None:
-        return "Playwright's Python package is not installed"
-    if shutil.which("chromium") is None:
-        return "there is no chromium on the PATH"
-    return None
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
-    lack = missing()
-    if lack is not None:
-        if os.environ.get("FIVEBAR_BROWSER") == "required":
-            pytest.fail(f"FIVEBAR_BROWSER is required, but {lack}")
-        pytest.skip(lack)
-    from playwright.sync_api import sync_playwright
-
-    with sync_playwright() as playwright:
-        flags = ["--no-sandbox", "--disable-gpu"]
-        started = playwright.chromium.launch(executable_path=shutil.which("chromium"), args=flags)
-        yield started
-        started.close()
 
 
 @pytest.fixture(scope="module")

@@ -1,12 +1,7 @@
-"""The page in a browser: alone, right to float32, by mouse, finger and keyboard, in any width.
-
-Needs Chromium and Playwright's Python package; FIVEBAR_BROWSER=required makes their lack an error.
-"""
+"""The page in a browser: alone, right to float32, by mouse, finger and keyboard, in any width."""
 
 from __future__ import annotations
 
-import os
-import shutil
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -14,7 +9,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 from page_sight import CLASSIC, SMALL, TOO_WIDE, Sight, compiled, drawn, is_right
-from test_report_browser import missing
 
 from fivebar_sim import kinematics, page, rollout
 from fivebar_sim.geometry import FiveBar
@@ -22,22 +16,6 @@ from fivebar_sim.scenario import Scenario
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
-    lack = missing()
-    if lack is not None:
-        if os.environ.get("FIVEBAR_BROWSER") == "required":
-            pytest.fail(f"FIVEBAR_BROWSER is required, but {lack}")
-        pytest.skip(lack)
-    from playwright.sync_api import sync_playwright
-
-    with sync_playwright() as playwright:
-        flags = ["--no-sandbox", "--disable-gpu"]
-        started = playwright.chromium.launch(executable_path=shutil.which("chromium"), args=flags)
-        yield started
-        started.close()
 
 
 @pytest.fixture(scope="module")
