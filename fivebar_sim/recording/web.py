@@ -71,6 +71,8 @@ canvas.visible { visibility: visible; }
 
 SCRIPT = """
 "use strict";
+/* The viewer tells in thousands of lines how it translates its shaders, and starts later by it. */
+console.debug = () => {};
 const say = (text) => { document.getElementById("status").textContent = text; };
 async function start() {
   const canvas = document.getElementById("the_canvas_id");

@@ -53,12 +53,14 @@ def test_the_leg_is_in_sight_and_nothing_leaves_the_machine(
     result = rollout.run(Scenario.load("classic-ellipse", ["duration=0.8"]))
     rrd.write(tmp_path / "a.rrd", [result])
     asked: list[str] = []
+    told: list[str] = []
     with web.Server(0) as server:
         server.pages = web.pages(tmp_path / "a.rrd", "ellipse")
         threading.Thread(target=server.serve_forever, daemon=True).start()
         page = browser.new_page(viewport={"width": WIDE, "height": HIGH})
         page.on("request", lambda request: asked.append(request.url))
         page.on("websocket", lambda socket: asked.append(socket.url))
+        page.on("console", lambda message: told.append(message.type))
         page.goto(server.url)
         page.wait_for_selector("#the_canvas_id.visible", timeout=1e3 * PATIENCE)
         end = time.monotonic() + PATIENCE
@@ -76,3 +78,5 @@ def test_the_leg_is_in_sight_and_nothing_leaves_the_machine(
     names = {urlsplit(url).path for url in asked}
     assert {"/", "/re_viewer_bg.wasm", "/recording.rrd"} <= names
     assert {urlsplit(url).netloc for url in asked} == {f"127.0.0.1:{server.port}"}
+    # Thousands of lines about each shader would fill the console, and take half of the time.
+    assert "debug" not in told
