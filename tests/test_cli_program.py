@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import re
 import subprocess
@@ -106,6 +107,47 @@ for args in (["--version"], ["-h"], ["run", "--help"]):
 """
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert [line for line in done.stdout.splitlines() if "slow:" in line] == 4 * ["slow: []"]
+
+
+def test_tables_do_without_pandas_unless_something_needs_it(tmp_path: Path) -> None:
+    (tmp_path / "pandas.py").write_text("__version__ = '3.0.0'", encoding="utf-8")
+    code = """
+import sys
+import numpy, pyarrow
+from fivebar_sim.cli import arrow
+arrow.leave_pandas_out()
+assert pyarrow.array(numpy.ones(2)).to_pylist() == [1.0, 1.0]
+assert "pandas" not in sys.modules
+try:
+    pyarrow.table({"a": [1]}).to_pandas()
+# There is no such thing in the one that stands in for it.
+except AttributeError:
+    print(sys.modules["pandas"].__version__)
+"""
+    env = os.environ | {"PYTHONPATH": str(tmp_path)}
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, env=env, check=True
+    )
+    assert done.stdout == "3.0.0\n"
+
+
+def test_the_collector_is_seldom_called_within(monkeypatch: pytest.MonkeyPatch) -> None:
+    usual = gc.get_threshold()
+    during: list[int] = []
+
+    def call(args: list[str]) -> int:
+        during.append(gc.get_threshold()[0])
+        return 0
+
+    monkeypatch.setattr(fivebar, "_call", call)
+    try:
+        for first in (700, 0, 90_000):
+            gc.set_threshold(first, *usual[1:])
+            assert fivebar.main([]) == 0
+            assert gc.get_threshold()[0] == first
+    finally:
+        gc.set_threshold(*usual)
+    assert during == [10_000, 0, 90_000]
 
 
 def test_help_is_a_line_a_command(shell: Shell) -> None:

@@ -6,6 +6,7 @@ Exit status: 0 fine, 1 failed, 2 bad input; `terminal` has all of them.
 from __future__ import annotations
 
 import functools
+import gc
 import importlib
 import io
 import keyword
@@ -16,7 +17,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any
 
-from fivebar_sim.cli import memory, signals, terminal
+from fivebar_sim.cli import arrow, memory, signals, terminal
 from fivebar_sim.cli.terminal import FAILED, INTERRUPTED, UNREAD, WRONG, say
 from fivebar_sim.errors import ConfigError, DivergedError, FiveBarError, unknown
 
@@ -60,6 +61,9 @@ FEWEST = 40
 SAFE = "PYTHONSAFEPATH"
 """The variable with which Python imports nothing from the folder that it is started in."""
 
+SELDOM = 10_000
+"""New objects after which the garbage collector looks for what nobody needs any more."""
+
 _before: dict[str, str | None] = {}
 """What `_environment` changed, and what it was before."""
 
@@ -70,7 +74,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     # A name may have letters that the terminal's encoding lacks: they must not end the program.
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(errors="backslashreplace")
-    with terminal.output(), _environment(_needed()):
+    with terminal.output(), _environment(_needed()), _seldom_collected():
         return _main(args)
 
 
@@ -99,6 +103,22 @@ def _environment(changes: Mapping[str, str]) -> Iterator[None]:
             os.environ.pop(name, None)
             if name in theirs:
                 os.environ[name] = theirs[name]
+
+
+@contextmanager
+def _seldom_collected() -> Iterator[None]:
+    """Have the garbage collector look less often within.
+
+    What is imported stays, and the collector would go through it a dozen times in vain.
+    """
+    before = gc.get_threshold()
+    # 0 is the user's wish that it never looks.
+    if before[0]:
+        gc.set_threshold(max(before[0], SELDOM), *before[1:])
+    try:
+        yield
+    finally:
+        gc.set_threshold(*before)
 
 
 def user_environment() -> dict[str, str]:
@@ -228,6 +248,8 @@ def _command(name: str) -> Callable[..., int]:
     @functools.wraps(function)
     def command(*args: Any, **options: Any) -> int:
         terminal.style(allowed=False)
+        if name in arrow.USED_BY:
+            arrow.leave_pandas_out()
         return function(*args, **options)
 
     return command
