@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from functools import reduce
 from typing import Any
@@ -17,6 +18,9 @@ Bools = NDArray[np.bool_]
 
 ROWS = 4096
 """Rows of a long array that are computed at once, so that what comes up meanwhile stays small."""
+
+FEW = 64
+"""Numbers up to which it takes less time to write an array out than to broadcast a view of it."""
 
 
 def blocks(rows: int) -> Iterator[slice]:
@@ -103,8 +107,19 @@ def broadcast(**arrays: Array) -> list[Array]:
         return list(arrays.values())
 
     try:
-        return list(np.broadcast_arrays(*arrays.values()))
+        shape = np.broadcast(*arrays.values()).shape
     except ValueError:
         shapes = " and ".join(str(array.shape) for array in arrays.values())
         names = " and ".join(arrays)
         raise ArgumentError(f"{names} must broadcast, got shapes {shapes}") from None
+
+    if math.prod(shape) > FEW:
+        return list(np.broadcast_arrays(*arrays.values()))
+    return [array if array.shape == shape else _filled(array, shape) for array in arrays.values()]
+
+
+def _filled(array: Array, shape: tuple[int, ...]) -> Array:
+    """Return an array of a shape with what another one broadcasts to."""
+    filled = np.empty(shape)
+    filled[...] = array
+    return filled

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fivebar_sim.arrays import Array, largest_of_columns, largest_of_rows, sum_of_columns
+from fivebar_sim.arrays import Array, broadcast, largest_of_columns, largest_of_rows, sum_of_columns
+from fivebar_sim.errors import ArgumentError
 
 
 def draws(rows: int, columns: int) -> Array:
@@ -29,3 +30,16 @@ def test_nan_is_the_largest_of_all() -> None:
     assert np.isnan(largest_of_rows(values)).tolist() == [k == 4 for k in range(9)]
     assert np.isnan(largest_of_columns(values)).tolist() == [False, True]
     assert np.isnan(sum_of_columns(values)).tolist() == [False, True]
+
+
+@pytest.mark.parametrize("rows", [1, 20, 1000])
+def test_broadcast_is_numpy_s(rows: int) -> None:
+    """Few numbers are written out, many are not; the values are the same."""
+    rng = np.random.default_rng(3)
+    one = rng.normal(size=(rows, 2))
+    other = rng.normal(size=2)
+    both = broadcast(one=one, other=other)
+    for ours, theirs in zip(both, np.broadcast_arrays(one, other), strict=True):
+        np.testing.assert_array_equal(ours, theirs)
+    with pytest.raises(ArgumentError, match=r"^one and x must broadcast, got"):
+        broadcast(one=one, x=np.zeros(3))

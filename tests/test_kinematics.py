@@ -235,6 +235,12 @@ def test_foot_on_A_of_equal_links_has_theta_A_zero() -> None:
     assert np.abs(np.subtract(both, A)).max(axis=-1).min() < 1e-16
 
 
+def test_axes_that_are_kept_cannot_be_written_to() -> None:
+    for axis in kinematics.bases(RIGID):
+        with pytest.raises(ValueError, match="read-only"):
+            axis += 1.0
+
+
 def test_nearest_solution_over_the_half_turn_and_the_tie() -> None:
     near = kinematics.inverse_nearest(RIGHT, (0.0, -0.04), (0.1, -math.pi + 0.1))
     np.testing.assert_allclose(near, (0.0, -math.pi), rtol=0, atol=1e-15)  # not +pi: 0.1 away

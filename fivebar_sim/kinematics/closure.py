@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -40,7 +41,23 @@ class Branch(NamedTuple):
 
 
 def bases(leg: FiveBar | LegArrays) -> tuple[Array, Array]:
-    """Return the motor axes A and E [m], hip frame: -+ L5 / 2 (cos tilt, sin tilt)."""
+    """Return the motor axes A and E [m], hip frame: -+ L5 / 2 (cos tilt, sin tilt).
+
+    Those of one leg are kept, and cannot be written to.
+    """
+    return _kept_bases(leg) if isinstance(leg, FiveBar) else _bases(leg)
+
+
+# A controller asks for the same leg at every control step. Typed, since 1.0 == True.
+@lru_cache(maxsize=256, typed=True)
+def _kept_bases(leg: FiveBar) -> tuple[Array, Array]:
+    A, E = _bases(leg)
+    A.flags.writeable = False
+    E.flags.writeable = False
+    return A, E
+
+
+def _bases(leg: FiveBar | LegArrays) -> tuple[Array, Array]:
     half = 0.5 * leg.L5 * unit(leg.tilt)
     return -half, half
 
