@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Mapping
-from typing import Any, NamedTuple
+from typing import Any
 
 import gymnasium
 import mujoco
@@ -17,12 +17,11 @@ from gymnasium.spaces import Box, Space
 
 from fivebar_sim import tasks
 from fivebar_sim.arrays import Array
-from fivebar_sim.errors import ArgumentError, unknown
-from fivebar_sim.geometry import FiveBar
-from fivebar_sim.render.leg_picture import HEIGHT, LARGEST, WIDTH, Camera, LegPicture
+from fivebar_sim.render.leg_picture import HEIGHT, WIDTH, Camera, Picture
 from fivebar_sim.tasks import REASONS, Randomise, Task, options
 from fivebar_sim.tasks.episodes import Episodes, Outcome
 from fivebar_sim.tasks.legs import LegGroup
+from fivebar_sim.tasks.pictures import Pictures, check_render_mode, check_reset_options
 
 RENDER_MODES = ("rgb_array",)
 
@@ -69,61 +68,6 @@ class Registered:
             kept.kwargs = {name: options.plain(each) for name, each in kept.kwargs.items()}
             kept.max_episode_steps = self.task.periods
         self._spec = kept
-
-
-def check_reset_options(given: Any, known: tuple[str, ...] = ()) -> dict[str, Any]:
-    """Return the options of a reset.
-
-    Raises:
-        ArgumentError: Not a table, or one with an unknown key.
-    """
-    if given is not None and not isinstance(given, Mapping):
-        raise ArgumentError(f"options of reset must be None or a table, got {given!r}")
-    for name in given or {}:
-        if name not in known:
-            legal = unknown("option of reset", str(name), known)
-            raise ArgumentError(legal if known else f"reset has no options, got {name!r}")
-    return dict(given or {})
-
-
-class Pictures(NamedTuple):
-    """What the pictures of an environment look like.
-
-    Attributes:
-        camera: Where the camera stands.
-        width, height: Size of a leg's picture [pixels].
-    """
-
-    camera: Camera
-    width: int
-    height: int
-
-    @classmethod
-    def of(cls, camera: Any, width: Any, height: Any) -> Pictures:
-        """Return them, checked.
-
-        Raises:
-            ArgumentError: A value of the wrong type or out of range.
-        """
-        for name, side in (("width", width), ("height", height)):
-            if options.check_whole(name, side, 1) > LARGEST:
-                raise ArgumentError(f"{name} must be in [1, {LARGEST}] pixels, got {side!r}")
-        placed = options.as_struct("camera", {} if camera is None else camera, Camera)
-        return cls(placed, int(width), int(height))
-
-    def of_leg(self, model: mujoco.MjModel, leg: FiveBar) -> LegPicture:
-        """Return what takes them of a leg."""
-        return LegPicture(model, leg, self.camera, width=self.width, height=self.height)
-
-
-def check_render_mode(render_mode: Any, known: tuple[str, ...]) -> None:
-    """Raise unless a render mode is one of those known, or None.
-
-    Raises:
-        ArgumentError: It is not.
-    """
-    if render_mode is not None and render_mode not in known:
-        raise ArgumentError(unknown("render_mode", str(render_mode), known))
 
 
 class LegEnv(  # pyright: ignore[reportIncompatibleVariableOverride]
@@ -174,7 +118,7 @@ class LegEnv(  # pyright: ignore[reportIncompatibleVariableOverride]
         self._group = LegGroup(tasks.task(task, **task_options), [seed], ranges)
         self.render_mode = render_mode
         # Made by the first `render`: training without pictures needs no GL.
-        self._picture: LegPicture | None = None
+        self._picture: Picture | None = None
         self._data: mujoco.MjData | None = None
         self.task = self._group.task
         self.episodes = self._group.episodes

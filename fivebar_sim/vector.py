@@ -16,18 +16,12 @@ from fivebar_sim import tasks
 from fivebar_sim.arrays import Array, Bools
 from fivebar_sim.checks import is_finite
 from fivebar_sim.errors import ArgumentError, unknown
-from fivebar_sim.gym import (
-    Pictures,
-    Registered,
-    check_render_mode,
-    check_reset_options,
-    layout,
-    spaces,
-)
-from fivebar_sim.render.leg_picture import HEIGHT, WIDTH, Camera, LegPicture
+from fivebar_sim.gym import Registered, layout, spaces
+from fivebar_sim.render.leg_picture import HEIGHT, WIDTH, Camera, Picture
 from fivebar_sim.tasks import REASONS, Randomise, Task, options
 from fivebar_sim.tasks.episodes import Outcome
 from fivebar_sim.tasks.legs import LegGroup
+from fivebar_sim.tasks.pictures import Pictures, check_render_mode, check_reset_options
 
 RENDER_MODES = ("rgb_array", "rgb_array_list")
 """One picture of all legs, and a picture of each."""
@@ -104,7 +98,7 @@ class LegVectorEnv(  # pyright: ignore[reportIncompatibleVariableOverride]
         seeds = range(first, first + self.num_envs)
         self._group = LegGroup(wanted, seeds, tasks.ranges(randomise), threads)
         self.render_mode = render_mode
-        self._picture: LegPicture | None = None
+        self._picture: Picture | None = None
         self.task = self._group.task
         self.episodes = self._group.episodes
         self.drawn = self._group.drawn

@@ -18,7 +18,7 @@ import fivebar_sim.gym
 from fivebar_sim import Scenario, kinematics, motion, run
 from fivebar_sim.control.sensors import Sensors
 from fivebar_sim.control.servo import Servo
-from fivebar_sim.errors import ArgumentError
+from fivebar_sim.errors import ArgumentError, ConfigError
 from fivebar_sim.files import resources
 from fivebar_sim.geometry import FiveBar
 from fivebar_sim.gym import LegEnv
@@ -26,6 +26,7 @@ from fivebar_sim.metrics import ground
 from fivebar_sim.scenario.scenes import Treadmill
 from fivebar_sim.tasks import KINDS
 from fivebar_sim.tasks.episodes import to_bounds
+from fivebar_sim.walking.env import WalkEnv
 
 ROOT = Path(__file__).resolve().parents[1]
 SPACES_IN_SI = pytest.mark.filterwarnings(
@@ -314,3 +315,20 @@ def test_refusal_of_what_is_unknown() -> None:
         LegEnv("run")
     with pytest.raises(ArgumentError, match=r"^unknown render_mode 'human'; known: rgb_array"):
         LegEnv("track", render_mode="human")
+
+
+def test_picture_shows_the_robot_and_follows_it() -> None:
+    made = WalkEnv(render_mode="rgb_array", width=80, height=60)
+    with pytest.raises(ArgumentError, match=r"^render comes after reset"):
+        made.render()
+    made.reset(seed=1)
+    try:
+        picture = made.render()
+    except ConfigError as error:
+        pytest.skip(str(error))
+    assert picture.shape == (60, 80, 3)
+    assert picture.std() > 5.0
+    np.testing.assert_array_equal(picture, made.render())
+    made.step(np.full(8, 0.5))
+    assert (picture != made.render()).any()
+    made.close()

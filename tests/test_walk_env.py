@@ -44,7 +44,7 @@ def played(played_by: WalkEnv, seed: int) -> np.ndarray:
 @SPACES_IN_SI
 def test_gymnasiums_checker_passes() -> None:
     made = gymnasium.make("fivebar/Walk-v0", duration=0.04, randomise=True).unwrapped
-    check_env(made, skip_render_check=True)
+    check_env(made, skip_render_check=True)  # which makes four more of them
 
 
 class Steps(msgspec.Struct, frozen=True):
@@ -100,7 +100,7 @@ def test_a_seed_says_all_and_draws_within_the_ranges() -> None:
 def test_robot_told_to_stand_is_paid_for_standing() -> None:
     made = env(speed=(0.0, 0.0), turn=(-1e-9, 1.0))
     made.reset(seed=1)
-    made._wanted = np.zeros(2)
+    made.episode.wanted = np.zeros(2)
     for _ in range(9):
         made.step(STILL)
     _, reward, _, _, info = made.step(STILL)
@@ -124,12 +124,20 @@ def test_fall_ends_the_episode_and_says_why() -> None:
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"speeed": 1.0}, "unknown option 'speeed' of Walk-v0"),
+        ({"speeed": 1.0}, r"unknown option of Walk-v0 'speeed'; known: .*did you mean 'speed'"),
         ({"speed": (0.3, 0.1)}, r"speed\[1\] must be in \[0\.3, 1000\]"),
         ({"span": 0.0}, r"span must be in \(0, .*\) rad, got 0"),
         ({"period": 0.0155}, "period must be a whole number of timesteps"),
         ({"randomise": {"height": [1, 2]}}, "randomise must be True or a table of friction, mass"),
-        ({"render_mode": "human"}, "render_mode must be None"),
+        ({"randomise": {"mass": 1.0}}, r"randomise\.mass must be two numbers \(low, high\), got 1"),
+        (
+            {"randomise": {"mass": [1, np.nan]}},
+            r"randomise\.mass\[1\] must be in \[1, 10\], got nan",
+        ),
+        ({"randomise": {"delay": [1, 0]}}, r"randomise\.delay\[1\] must be in \[1, 1\] s, got 0"),
+        ({"render_mode": "human"}, "unknown render_mode 'human'; known: rgb_array"),
+        ({"width": 0}, r"width must be a whole number in \[1, inf\), got 0"),
+        ({"camera": {"azimut": 0}}, "unknown key 'azimut'"),
     ],
 )
 def test_what_cannot_be_is_refused(options: dict[str, Any], message: str) -> None:
@@ -137,9 +145,22 @@ def test_what_cannot_be_is_refused(options: dict[str, Any], message: str) -> Non
         env(**options)
 
 
-@pytest.mark.parametrize("action", [np.zeros(7), np.full(8, 1.1), np.full(8, np.nan)])
-def test_action_out_of_its_space_is_refused(action: np.ndarray) -> None:
+@pytest.mark.parametrize("action", [np.zeros(7), np.full(8, 1.1), np.full(8, np.nan), "up"])
+def test_action_out_of_its_space_is_refused(action: Any) -> None:
     made = env()
     made.reset(seed=1)
-    with pytest.raises(ArgumentError, match=r"an action must be 8 numbers in \[-1, 1\]"):
+    with pytest.raises(ArgumentError, match=r"^an action must be 8 numbers in \[-1, 1\], got "):
         made.step(action)
+
+
+def test_step_out_of_turn_is_refused() -> None:
+    made = env(duration=0.02)
+    with pytest.raises(ArgumentError, match=r"^step comes after reset$"):
+        made.step(STILL)
+    made.reset(seed=1)
+    assert made.step(STILL)[3]
+    with pytest.raises(ArgumentError, match=r"^the episode is over: reset comes before"):
+        made.step(STILL)
+    made.close()
+    with pytest.raises(ArgumentError, match=r"^the environment is closed"):
+        made.step(STILL)

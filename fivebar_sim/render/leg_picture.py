@@ -1,8 +1,9 @@
-"""Pictures of a leg in a pose, without a run or a screen."""
+"""Pictures of a leg or a robot in a pose, without a run or a screen."""
 
 from __future__ import annotations
 
 import copy
+from typing import NamedTuple
 
 import msgspec
 import mujoco
@@ -12,27 +13,28 @@ from numpy.typing import NDArray
 from fivebar_sim.arrays import Array
 from fivebar_sim.checks import check_number
 from fivebar_sim.errors import ArgumentError, ConfigError
-from fivebar_sim.geometry import FiveBar
 from fivebar_sim.render import gl
 
 WIDTH = 640
 HEIGHT = 480
 LARGEST = 8192
 """Most pixels along a side."""
-GEOMS = 200
+GEOMS = 400
 """Most geoms of a scene."""
 FAR = 3.5
-"""Distance of the camera in leg sizes."""
+"""Distance of the camera in sizes of the leg or the robot."""
 
 
 class Camera(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """Where the camera of a leg's pictures stands, as in MuJoCo's free camera.
+    """Where the camera of an environment's pictures stands, as in MuJoCo's free camera.
 
     Attributes:
         azimuth: Its direction about the vertical [deg]; 90 looks along the hip's axis.
         elevation: How far it looks up [deg].
-        distance: From the point that it looks at [m]; None for 3.5 times the leg's size.
-        lookat: That point (x, y, z) [m]; None for one below the hip, which it then follows.
+        distance: From the point that it looks at [m]; None for 3.5 times the leg's size, or the
+            robot's length.
+        lookat: That point (x, y, z) [m]; None for one below the hip, or a robot's trunk, which it
+            then follows.
     """
 
     azimuth: float = 90.0
@@ -53,12 +55,26 @@ class Camera(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
             check_number(f"camera.lookat[{k}]", part, "m")
 
 
-class LegPicture:
-    """A scene and a camera, which take pictures of a leg.
+class Subject(NamedTuple):
+    """What a camera looks at where nothing else is said.
+
+    Attributes:
+        body: The body that it follows.
+        below: How far below that body's origin it looks [m].
+        distance: Its distance [m].
+    """
+
+    body: str
+    below: float
+    distance: float
+
+
+class Picture:
+    """A scene and a camera, which take pictures.
 
     Args:
-        model: The leg's model.
-        leg: The leg.
+        model: The model.
+        subject: What they are of.
         camera: Where the camera stands.
         width: Width of the pictures [pixels].
         height: Height of the pictures [pixels].
@@ -70,7 +86,7 @@ class LegPicture:
     def __init__(
         self,
         model: mujoco.MjModel,
-        leg: FiveBar,
+        subject: Subject,
         camera: Camera = Camera(),  # noqa: B008 - it is frozen
         *,
         width: int = WIDTH,
@@ -84,7 +100,7 @@ class LegPicture:
         model.vis.quality.shadowsize = min(2 * max(width, height), model.vis.quality.shadowsize)
         self._model = model
         self._data = mujoco.MjData(model)
-        self._size = leg.size
+        self._subject = subject
         self._lookat = camera.lookat
         self._rect = mujoco.MjrRect(0, 0, width, height)
         self._scene = mujoco.MjvScene(model, GEOMS)
@@ -93,7 +109,7 @@ class LegPicture:
         self._camera.type = mujoco.mjtCamera.mjCAMERA_FREE
         self._camera.azimuth = camera.azimuth
         self._camera.elevation = camera.elevation
-        self._camera.distance = camera.distance or FAR * leg.size
+        self._camera.distance = camera.distance or subject.distance
         self._gl = gl.context()
 
         try:
@@ -108,7 +124,8 @@ class LegPicture:
         # Positions are all that a picture needs; mj_forward would solve for forces too.
         mujoco.mj_kinematics(self._model, self._data)
         mujoco.mj_camlight(self._model, self._data)
-        below = self._data.body("hip").xpos - (0.0, 0.0, 0.4 * self._size)
+        subject = self._subject
+        below = self._data.body(subject.body).xpos - (0.0, 0.0, subject.below)
         self._camera.lookat[:] = below if self._lookat is None else self._lookat
         every = mujoco.mjtCatBit.mjCAT_ALL
         mujoco.mjv_updateScene(

@@ -49,6 +49,10 @@ class SteppedLegs(Legs):
         if self._gears is not None:
             self._gears.restart(rows)
 
+    def change(self, models: list[mujoco.MjModel]) -> None:
+        """Go on with other models of the same structure; those that stay keep their bits."""
+        self.__setstate__({**self.__getstate__(), "models": models})
+
     def moved(self, ctrl: Array) -> tuple[Array, Array, NDArray[Any]]:
         """Return what `Legs.moved` does."""
         self._renew()

@@ -9,30 +9,20 @@ from collections.abc import Mapping
 from typing import Any
 
 import gymnasium
+import mujoco
 import numpy as np
 from gymnasium.spaces import Box
 
-from fivebar_sim import model
 from fivebar_sim.arrays import Array
-from fivebar_sim.control.servo import MotorStep, applied_torque
-from fivebar_sim.control.step import ControlStep
 from fivebar_sim.errors import ArgumentError
-from fivebar_sim.metrics.columns import MOTOR_JOINTS
-from fivebar_sim.robots import LEGS, Floor, Robot
-from fivebar_sim.robots.measure import Trunk, falls
-from fivebar_sim.robots.places import rotation
-from fivebar_sim.simulation.steps import Legs, States, is_broken
-from fivebar_sim.walking.draws import Ranges, draw_robot
-from fivebar_sim.walking.task import Moved, WalkTask
+from fivebar_sim.render.leg_picture import HEIGHT, WIDTH, Camera, Picture
+from fivebar_sim.robots import Robot
+from fivebar_sim.tasks.pictures import Pictures, check_render_mode, check_reset_options
+from fivebar_sim.walking.episodes.episode import MOTORS, PARTS, Episode, check_action
+from fivebar_sim.walking.episodes.group import WalkGroup
+from fivebar_sim.walking.episodes.options import task_of
 
-PARTS = {"command": 2, "gyro": 3, "down": 3, "theta": 8, "theta_dot": 8, "action": 8}
-"""What an observation is made of, and how many numbers each is."""
-
-MOTORS = [4 * leg + joint for leg in range(len(LEGS)) for joint in MOTOR_JOINTS]
-"""Where the motors are among the joints of all legs."""
-
-ROUNDING = 4.0 * float(np.finfo(np.float32).eps)
-"""What a network's float32 may leave of an action beyond 1."""
+RENDER_MODES = ("rgb_array",)
 
 
 class WalkEnv(gymnasium.Env[Array, Array]):
@@ -46,7 +36,11 @@ class WalkEnv(gymnasium.Env[Array, Array]):
 
     Args:
         robot: A preset's name, a TOML file, or a `Robot`.
-        render_mode: None; pictures are those of `fivebar render`.
+        render_mode: "rgb_array" or None.
+        width: Width of a picture [pixels].
+        height: Height of a picture [pixels].
+        camera: Where the camera stands: a `Camera`, or a table of azimuth, elevation [deg],
+            distance and lookat [m]; None for its defaults.
         options: Attributes of `WalkTask`; randomise also as a table or True, its defaults.
 
     Raises:
@@ -54,26 +48,31 @@ class WalkEnv(gymnasium.Env[Array, Array]):
         ConfigError: An unknown preset, or a file with an illegal value.
     """
 
-    metadata = {"render_modes": [], "render_fps": 50}  # noqa: RUF012 - as in Env
+    metadata = {"render_modes": list(RENDER_MODES), "render_fps": 50}  # noqa: RUF012 - as in Env
 
     def __init__(
-        self, robot: str | Robot = "q8bot", render_mode: str | None = None, **options: Any
+        self,
+        robot: str | Robot = "q8bot",
+        render_mode: str | None = None,
+        width: int = WIDTH,
+        height: int = HEIGHT,
+        camera: Camera | Mapping[str, Any] | None = None,
+        **options: Any,
     ) -> None:
-        if render_mode is not None:
-            raise ArgumentError(f"render_mode must be None, got {render_mode!r}")
-        unknown = sorted(set(options) - set(WalkTask.__struct_fields__))
-        if unknown:
-            raise ArgumentError(f"unknown option {unknown[0]!r} of Walk-v0")
-        options["randomise"] = _ranges(options.get("randomise"))
-        loaded = robot if isinstance(robot, Robot) else Robot.load(robot)
-        self.task = WalkTask(robot=loaded, **options)
+        check_render_mode(render_mode, RENDER_MODES)
+        self._pictures = Pictures.of(camera, width, height)
+        self.task = task_of(robot, options)
+        self.render_mode = render_mode
+        # Made by the first `render`: training without pictures needs no GL.
+        self._picture: Picture | None = None
+        self._group = WalkGroup(self.task, 1)
+        self._is_closed = False
+        self.observation_space, self.action_space = spaces()
+        self.metadata = {**self.metadata, "render_fps": 1.0 / self.task.period}
 
-        self.render_mode = None
-        size = sum(PARTS.values())
-        self.observation_space: Any = Box(-np.inf, np.inf, (size,), np.float64)
-        self.action_space: Any = Box(-1.0, 1.0, (len(MOTORS),), np.float64)
-        self.robot = loaded
-        self._model = None
+    def __getstate__(self) -> dict[str, Any]:
+        # A GL context cannot be copied; the next `render` makes one.
+        return {**self.__dict__, "_picture": None}
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -84,138 +83,77 @@ class WalkEnv(gymnasium.Env[Array, Array]):
             seed: Seed of this and the following episodes; None: go on with the last one.
             options: None or {}: a reset has no options.
         """
-        if options:
-            raise ArgumentError(f"reset has no options, got {sorted(options)[0]!r}")
+        check_reset_options(options)
         super().reset(seed=seed)
-        self._build()
-        task = self.task
-        assert self._model is not None
-        start = self._model.key("stand").qpos.copy()
-        self._standing = start[7:][MOTORS].reshape(len(LEGS), 2)
-        gravity = self._model.opt.gravity
-        self._gravity = gravity / np.linalg.norm(gravity)
-        self._legs = Legs(self._model, start[None])
-        self._control = ControlStep(
-            self.robot.servo,
-            task.sensors,
-            "position",
-            timestep=task.timestep,
-            every=task.every,
-            steps=task.periods * task.every,
-            start=self._standing,
-            seeds=self.np_random.integers(2**31, size=len(LEGS)).tolist(),
-        )
-
-        self._k = 0
-        self._qpos = start[None]
-        self._qvel = np.zeros((1, self._model.nv))
-        self._action = np.zeros(len(MOTORS))
-        low, high = np.array([task.speed, task.turn]).T
-        self._wanted = self.np_random.uniform(low, high)
-        return self._observation(), {}
+        return self._group.reset([self.np_random]).observation[0], {}
 
     def step(self, action: Array) -> tuple[Array, float, bool, bool, dict[str, Any]]:
         """Return observation, reward, terminated, truncated and info after a control period.
 
         Raises:
-            ArgumentError: An action that is not eight numbers in [-1, 1].
+            ArgumentError: An action that is not eight numbers in [-1, 1], or no episode that goes
+                on.
         """
-        self._action = _checked(action)
-        task = self.task
-        command = self._standing + task.span * self._action.reshape(len(LEGS), 2)
-        sent = self._control.send(self._k, command)
-        states = self._legs.advance(np.concatenate([*sent], axis=-1)[None])
-        before = self._qpos[-1:]
-        self._k += task.every
+        values = check_action(action)
+        if self._is_closed:
+            raise ArgumentError("the environment is closed: make another one")
+        if self._group.over[0]:
+            raise ArgumentError("the episode is over: reset comes before the next step")
+        outcome = self._group.step(values[None])
+        terms = {name: float(term[0]) for name, term in outcome.terms.items()}
+        info = {"terms": terms, "reason": str(outcome.reason[0])}
+        over = bool(outcome.terminated[0]), bool(outcome.truncated[0])
+        return outcome.observation[0], float(outcome.reward[0]), *over, info
 
-        if is_broken(states, slice(None)):
-            return self._observation(), 0.0, True, False, {"terms": {}, "reason": "diverged"}
-        self._qpos = states.qpos[0].copy()
-        self._qvel = states.qvel[0].copy()
-        seen = (self._qpos[:, 7:][:, MOTORS], self._qvel[:, 6:][:, MOTORS])
-        self._control.moved(*(np.moveaxis(part.reshape(-1, len(LEGS), 2), 1, 0) for part in seen))
+    def render(self) -> Any:
+        """Return a picture of the robot, (height, width, 3); None without a render mode.
 
-        trunk = self._trunk(before)
-        terms = task.terms(
-            self._wanted, Moved.of(trunk, self.robot.length), self._torque(states, before)
-        )
-        box = self.robot.trunk
-        fell = falls(trunk, box.size, np.array(box.center))
-        over = self._k >= task.periods * task.every
-        info = {"terms": terms, "reason": fell[0].why if fell else ""}
-        return self._observation(), sum(terms.values()), bool(fell), over, info
+        Raises:
+            ArgumentError: There is no episode yet.
+            ConfigError: There is no working GL.
+        """
+        if self.render_mode is None:
+            return None
+        if not self._group.has_begun:
+            raise ArgumentError("render comes after reset")
+        if self._picture is None:
+            self._picture = self._pictures.of_robot(self.model, self.task.robot)
+        return self._picture.take(self._group.qpos[0])
+
+    def close(self) -> None:
+        """Free the GL context of the pictures."""
+        self._is_closed = True
+        if self._picture is not None:
+            self._picture.close()
+            self._picture = None
+
+    @property
+    def robot(self) -> Robot:
+        """The robot of this episode, drawn if the task says so."""
+        return self._group.robots[0]
+
+    @property
+    def model(self) -> mujoco.MjModel:
+        """Its MuJoCo model; the robot itself is stepped with a copy."""
+        return self._group.models[0]
 
     @property
     def down(self) -> Array:
         """Direction of gravity in the trunk's frame, without noise, (3,)."""
-        # It leans where the floor rises: the world's axes are the floor's.
-        return self._gravity @ rotation(self._qpos[-1:, 3:7])[0]
+        return self.episode.down
 
     @property
     def theta(self) -> Array:
         """Angles of the motors, without noise [rad], (4, 2)."""
-        return self._qpos[-1, 7:][MOTORS].reshape(len(LEGS), 2)
+        return self.episode.theta
 
-    def _build(self) -> None:
-        """Build the robot's model: once, or for every episode if it is drawn."""
-        task = self.task
-        friction = task.friction
-        if task.randomise is not None:
-            self.robot, friction = draw_robot(task.robot, task.randomise, self.np_random)
-        elif self._model is not None:
-            return
-        floor = Floor(friction=friction, slope=task.slope)
-        self._model = model.build_robot(self.robot, floor, timestep=task.timestep)
-
-    def _trunk(self, before: Array) -> Trunk:
-        """Return the trunk before the last control period and after each step of it."""
-        qpos = np.concatenate([before, self._qpos])
-        time = self.task.timestep * np.arange(1, len(qpos) + 1, dtype=np.float64)
-        turning = np.zeros((len(qpos), 3))
-        return Trunk(time, qpos[:, :3], qpos[:, 3:7], turning)
-
-    def _torque(self, states: States, before: Array) -> Array:
-        """Return the torque of each motor in each step of the last period [N m], (n, 8)."""
-        q = np.concatenate([before, self._qpos])[:, 7:][:, MOTORS]
-        step = MotorStep(
-            integrator="discrete",
-            ctrl=states.ctrl[0],
-            q=q[:-1],
-            q_next=q[1:],
-            v_next=self._qvel[:, 6:][:, MOTORS],
-            drive="position",
-        )
-        return applied_torque(self.robot.servo, step)
-
-    def _observation(self) -> Array:
-        """Return what the robot knows."""
-        seen = self._control.observe(self._k)
-        task = self.task
-        down = self.down + task.down_noise * self.np_random.standard_normal(3)
-        gyro = self._qvel[-1, 3:6] + task.gyro_noise * self.np_random.standard_normal(3)
-        parts = [self._wanted, gyro, down, seen.theta, seen.theta_dot, self._action]
-        return np.concatenate([np.ravel(part) for part in parts])
+    @property
+    def episode(self) -> Episode:
+        """The episode that goes on."""
+        return self._group.episodes[0]
 
 
-def _checked(action: Any) -> Array:
-    """Return an action as an array, at most 1 off 0; see `ROUNDING`."""
-    values = np.asarray(action, dtype=np.float64)
-    if values.shape != (len(MOTORS),) or not np.all(np.abs(values) <= 1.0 + ROUNDING):
-        raise ArgumentError(
-            f"an action must be {len(MOTORS)} numbers in [-1, 1], got {values.tolist()}"
-        )
-    return np.clip(values, -1.0, 1.0)
-
-
-def _ranges(value: Any) -> Ranges | None:
-    """Return what is drawn for every episode: of a table, of True, or as it is."""
-    if value is None or isinstance(value, Ranges):
-        return value
-    if value is True:
-        return Ranges()
-    known = Ranges._fields
-    if not isinstance(value, Mapping) or not set(value) <= set(known):
-        raise ArgumentError(
-            f"randomise must be True or a table of {', '.join(known)}, got {value!r}"
-        )
-    return Ranges(**{key: (float(low), float(high)) for key, (low, high) in value.items()})
+def spaces() -> tuple[Any, Any]:
+    """Return the observation space and the action space of one robot."""
+    seen = Box(-np.inf, np.inf, (sum(PARTS.values()),), np.float64)
+    return seen, Box(-1.0, 1.0, (len(MOTORS),), np.float64)

@@ -1,0 +1,1 @@
+"""Episodes of robots at the task of walking, one or many at once."""
