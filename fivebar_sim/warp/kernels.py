@@ -1,6 +1,6 @@
 """Warp's kernels: commands in, states out, and torque limits that hold at the end of a step.
 
-The limits are those of `simulation.limits.clipping`, which explains modes; here a leg has a thread.
+The limits are those of `simulation.clipping`, which explains modes; here a leg has a thread.
 """
 # Warp reads annotations as types of its own, and its operators are not Python's.
 # pyright: reportInvalidTypeForm=false, reportMissingImports=false, reportArgumentType=false
@@ -146,6 +146,31 @@ def begin(
     wrong[leg] = 1
 
 
+@wp.func
+def choose(
+    leg: int,
+    misses: float,
+    modes: wp.array2d[int],
+    wanted: wp.array2d[int],
+    tried: wp.array[int],
+    least: wp.array[float],
+    best: wp.array[int],
+):
+    """Choose the modes to try next: those wanted, any untried ones, at last the best of all."""
+    present = row(modes[leg, 0], modes[leg, 1])
+    if misses < least[leg]:
+        least[leg] = misses
+        best[leg] = present
+    so_far = tried[leg] | (1 << present)
+    tried[leg] = so_far
+
+    number = best[leg]
+    if so_far != (1 << MOST_MODES) - 1:
+        number = untried(so_far, row(wanted[leg, 0], wanted[leg, 1]))
+    wanted[leg, 0] = mode_of(number // 3)
+    wanted[leg, 1] = mode_of(number % 3)
+
+
 @wp.kernel
 def judge(
     late: int,
@@ -219,24 +244,15 @@ def judge(
             misses = wp.max(misses, by)
             part = wp.max(part, by / limit[leg, motor])
 
-    present = row(modes[leg, 0], modes[leg, 1])
-    is_last = tried[leg] == (1 << MOST_MODES) - 1
-    if differs == 0 or is_last:
+    # The best of the modes was taken once more, and stays.
+    if differs == 0 or tried[leg] == (1 << MOST_MODES) - 1:
         wrong[leg] = 0
         if differs == 1 and part > SMALL:
             iterations[leg] = unsolved
         return
 
-    if misses < least[leg]:
-        least[leg] = misses
-        best[leg] = present
-    so_far = tried[leg] | (1 << present)
-    tried[leg] = so_far
-    number = best[leg]
-    if so_far != (1 << MOST_MODES) - 1:
-        number = untried(so_far, row(wanted[leg, 0], wanted[leg, 1]))
-    wanted[leg, 0] = mode_of(number // 3)
-    wanted[leg, 1] = mode_of(number % 3)
+    choose(leg, misses, modes, wanted, tried, least, best)
+    wrong[leg] = 1
     wp.atomic_add(left, 0, 1)
 
 
