@@ -209,7 +209,7 @@ def register() -> None:
             gymnasium.register(
                 name,
                 entry_point="fivebar_sim.gym:LegEnv",
-                vector_entry_point="fivebar_sim.vector:LegVectorEnv",
+                vector_entry_point="fivebar_sim.vector:vector_env",
                 kwargs={"task": kind},
             )
 

@@ -251,6 +251,53 @@ class LegVectorEnv(  # pyright: ignore[reportIncompatibleVariableOverride]
         return list(seed)
 
 
+def vector_env(
+    task: str | Task | Mapping[str, Any],
+    num_envs: int = 1,
+    *,
+    device: str | None = None,
+    **options: Any,
+) -> VectorEnv[Any, Any, Any]:
+    """Return many legs as one environment: `gymnasium.make_vec` calls this.
+
+    Args:
+        task: "track", "stand", "hop", "gait", or a Task.
+        num_envs: Number of legs.
+        device: None for MuJoCo on the processor; "cuda:0" for a card, "cpu-warp" for what a card
+            does without one.
+        options: Those of `LegVectorEnv`; on a device all but nthread and pictures.
+
+    Raises:
+        FiveBarError: As `LegVectorEnv`; on a device as its environment.
+    """
+    if device is None:
+        return LegVectorEnv(task, num_envs, **options)
+    return _on_device(device, task, num_envs, **options)
+
+
+def _on_device(
+    device: str,
+    task: str | Task | Mapping[str, Any],
+    num_envs: int,
+    randomise: Randomise | Mapping[str, Any] | None = None,
+    model_seed: int = 0,
+    autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
+    max_episode_steps: int | None = None,
+    **task_options: Any,
+) -> VectorEnv[Any, Any, Any]:
+    """Return legs on a device; see `vector_env`."""
+    for name in ("nthread", "render_mode", "width", "height", "camera"):
+        if task_options.pop(name, None) is not None:
+            raise ArgumentError(f"no device can use {name}; with device=None it is used")
+    # Slow to import, and an extra.
+    from fivebar_sim.warp.episodes.vector import DeviceVectorEnv
+
+    wanted = _shortened(tasks.task(task, **task_options), max_episode_steps)
+    seed = options.check_whole("model_seed", model_seed, 0)
+    n = options.check_whole("num_envs", num_envs, 1)
+    return DeviceVectorEnv(wanted, n, device, randomise, seed, _mode(autoreset_mode))
+
+
 def _generator(seed: int | None) -> np.random.Generator:
     return seeding.np_random(seed)[0]
 

@@ -128,9 +128,10 @@ def test_too_little_memory_says_how_many_legs_fit(monkeypatch: Any, short: Plan)
 # steps, against the processor's; compiling the kernels first takes minutes
 
 
-def stamp() -> Path:
-    """Return a file that lies in Warp's cache once all kernels of these tests are compiled."""
-    kernels = Path(str(devices.__file__)).with_name("kernels.py").read_bytes()
+def stamp(*files: str) -> Path:
+    """Return a file that lies in Warp's cache once all kernels of some tests are compiled."""
+    room = Path(str(devices.__file__)).parent
+    kernels = b"".join((room / name).read_bytes() for name in ("kernels.py", *files))
     versions = [importlib.metadata.version(name) for name in ("mujoco-warp", "warp-lang")]
     name = "-".join([*versions, hashlib.sha256(kernels).hexdigest()[:12]])
     return Path(devices.warp().config.kernel_cache_dir) / f"fivebar-sim-{name}"

@@ -81,10 +81,10 @@ def mujoco_warp() -> Any:
     return _imported("mujoco_warp")
 
 
-def kernels() -> Any:
-    """Return the module of our own kernels, which cannot be imported without Warp."""
+def kernels(name: str = "kernels") -> Any:
+    """Return a module of our own kernels, which cannot be imported without Warp."""
     warp()
-    return importlib.import_module("fivebar_sim.warp.kernels")
+    return importlib.import_module(f"fivebar_sim.warp.{name}")
 
 
 def _imported(name: str) -> Any:

@@ -29,10 +29,15 @@ holds.
 """
 
 
-def lean_models(models: Sequence[mujoco.MjModel]) -> list[mujoco.MjModel]:
-    """Return copies without what nobody sees, as on the processor, that Warp does not refuse."""
+def lean_models(models: Sequence[mujoco.MjModel], *, forces: bool = True) -> list[mujoco.MjModel]:
+    """Return copies without what nobody sees, as on the processor, that Warp does not refuse.
+
+    Args:
+        models: The models.
+        forces: Whether the ground's force is recorded.
+    """
     found: dict[int, mujoco.MjModel] = {}
-    shorts = lean(models)
+    shorts = lean(models, forces=forces)
     for short in shorts:
         if id(short) not in found:
             known = copy.copy(short)

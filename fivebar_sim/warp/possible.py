@@ -7,6 +7,8 @@ import mujoco
 from fivebar_sim.errors import ConfigError
 from fivebar_sim.model import friction_law
 from fivebar_sim.simulation.plan import Plan
+from fivebar_sim.tasks import KINDS, Task
+from fivebar_sim.tasks.legs import model_of
 from fivebar_sim.walking.plan import RobotPlan
 
 
@@ -31,10 +33,20 @@ def obstacle(planned: Plan) -> str | None:
     if planned.setpoints is None:
         name = planned.scenario.controller_name
         return f"the feedback controller {name!r}, which is asked in Python between the steps"
-    return _model_obstacle(planned.model)
+    return model_obstacle(planned.model)
 
 
-def _model_obstacle(model: mujoco.MjModel) -> str | None:
+def task_obstacle(task: Task) -> str | None:
+    """Return what keeps a task's episodes from running on a device; None if nothing does."""
+    if type(task) not in KINDS.values():
+        return f"a task of another kind than {', '.join(KINDS)}, here {task.kind!r}"
+    if task.sensors.noise > 0.0 or task.sensors.rate_noise > 0.0:
+        return "noise of the sensors (sensors.noise, sensors.rate_noise)"
+    return model_obstacle(model_of(task))
+
+
+def model_obstacle(model: mujoco.MjModel) -> str | None:
+    """Return what keeps a model from being stepped on a device; None if nothing does."""
     if friction_law(model) is not None:
         return "a gear friction that changes from step to step (servo.friction.model)"
     if model.opt.noslip_iterations > 0:
