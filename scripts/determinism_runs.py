@@ -20,8 +20,24 @@ WHOLE = int(mujoco.mjtState.mjSTATE_INTEGRATION)
 CTRL = int(mujoco.mjtState.mjSTATE_CTRL)
 
 
+def _of_states(kind: mujoco.mjtState) -> property:
+    """Return a property of the states' numbers of one kind, a row a leg."""
+
+    def read(batch: Plain) -> np.ndarray:
+        return batch.part(int(kind))
+
+    def fill(batch: Plain, values: np.ndarray) -> None:
+        batch.part(int(kind))[:] = values
+
+    return property(read, fill)
+
+
 class Plain:
     """As much of `mujoco.batch.Batch` as the package uses, one MjData a leg, one after another."""
+
+    qpos = _of_states(mujoco.mjtState.mjSTATE_QPOS)
+    qvel = _of_states(mujoco.mjtState.mjSTATE_QVEL)
+    qacc_warmstart = _of_states(mujoco.mjtState.mjSTATE_WARMSTART)
 
     def __init__(self, model: Any, nsim: int, nthread: int = 0) -> None:
         del nthread
@@ -36,17 +52,15 @@ class Plain:
         self.state = np.zeros((self.nsim, mujoco.mj_stateSize(self.model, WHOLE)))
         self._outputs: dict[str, np.ndarray] = {}
         self._datas = [mujoco.MjData(model) for model in self._models]
-        self.time = np.zeros(self.nsim)
-        self.qpos = np.array([data.qpos for data in self._datas])
-        self.qvel = np.array([data.qvel for data in self._datas])
-        self.qacc_warmstart = np.zeros_like(self.qvel)
+        for i, data in enumerate(self._datas):
+            mujoco.mj_getState(self._models[i], data, self.state[i], WHOLE)
+
         self.warning = np.zeros((self.nsim, len(self._datas[0].warning.number), 2), np.int32)
 
     def bind(self, name: str) -> np.ndarray:
         """Return the commands of all legs, or what every step leaves of another field."""
         if name == "ctrl":
-            first = mujoco.mj_stateSize(self.model, CTRL - 1)  # of all that comes before
-            return self.state[:, first : first + self.model.nu]
+            return self.part(CTRL)
 
         rows = [getattr(data, name) for data in self._datas]
         return self._outputs.setdefault(name, np.array(rows))
@@ -64,7 +78,6 @@ class Plain:
             data.ctrl[:] = self.bind("ctrl")[i]
             mujoco.mj_step(model, data)
             self._save(i)
-            mujoco.mj_getState(model, data, self.state[i], WHOLE)
             for name, rows in self._outputs.items():
                 rows[i] = getattr(data, name)
 
@@ -75,8 +88,9 @@ class Plain:
         control_spec: int = CTRL,
         record: Sequence[Any] = (),
         ids: Any = None,
+        out: dict[Any, np.ndarray] | None = None,
     ) -> dict[Any, Any]:
-        """Return what is recorded after each of the next steps, (n, steps, ...)."""
+        """Return what is recorded after each of the next steps, (n, steps, ...), or fill `out`."""
         rows: dict[Any, list] = {item: [] for item in record}
         for i, given in zip(range(self.nsim) if ids is None else ids, control, strict=True):
             data = self._load(i)
@@ -84,7 +98,17 @@ class Plain:
             self._save(i)
             for item, recorded in zip(record, stepped, strict=True):
                 rows[item].append(recorded)
-        return {item: np.stack(each) for item, each in rows.items()}
+        found = {item: np.stack(each) for item, each in rows.items()}
+        if out is None:
+            return found
+        for item, each in found.items():
+            out[item][:] = each
+        return out
+
+    def part(self, kind: int) -> np.ndarray:
+        """Return one kind of numbers of all legs' states, in place."""
+        first = mujoco.mj_stateSize(self.model, kind - 1)  # of all that comes before
+        return self.state[:, first : first + mujoco.mj_stateSize(self.model, kind)]
 
     def _load(self, i: int) -> Any:
         for name, rows in self._expanded.items():
@@ -92,20 +116,14 @@ class Plain:
             setattr(owner, field, rows[i])
 
         data = self._datas[i]
-        data.time = self.time[i]
-        data.qpos[:] = self.qpos[i]
-        data.qvel[:] = self.qvel[i]
-        data.qacc_warmstart[:] = self.qacc_warmstart[i]
+        mujoco.mj_setState(self._models[i], data, self.state[i], WHOLE)
         data.warning.lastinfo[:] = self.warning[i, :, 0]
         data.warning.number[:] = self.warning[i, :, 1]
         return data
 
     def _save(self, i: int) -> None:
         data = self._datas[i]
-        self.time[i] = data.time
-        self.qpos[i] = data.qpos
-        self.qvel[i] = data.qvel
-        self.qacc_warmstart[i] = data.qacc_warmstart
+        mujoco.mj_getState(self._models[i], data, self.state[i], WHOLE)
         self.warning[i, :, 0] = data.warning.lastinfo
         self.warning[i, :, 1] = data.warning.number
 

@@ -28,8 +28,8 @@ from fivebar_sim.robots import LEGS
 from fivebar_sim.runs import directory
 from fivebar_sim.scenario import Scenario
 from fivebar_sim.simulation import feedback, steps
-from fivebar_sim.walking import live as live_robots
-from fivebar_sim.walking import recording
+from fivebar_sim.walking.shown import live as live_robots
+from fivebar_sim.walking.shown import recording
 
 RUNS = {
     "setpoints": ("classic-ellipse", ["duration=0.9"]),

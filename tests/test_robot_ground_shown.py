@@ -14,7 +14,8 @@ from fivebar_sim.report import look, robot, robot_figures
 from fivebar_sim.robots.columns import trunk
 from fivebar_sim.robots.ground import Ground, Rough, Steps
 from fivebar_sim.runs.stored import StoredRun
-from fivebar_sim.walking import recorded_ground, recording
+from fivebar_sim.walking.shown import ground as shown_ground
+from fivebar_sim.walking.shown import recording
 
 SHORT = ("duration=0.1", "path.seconds=0.1", "path.ramp=0.05", "limits={}")
 STAIR = 'scene.ground={kind="steps", height="-5 mm", length="30 mm", start="20 mm"}'
@@ -30,7 +31,7 @@ def stood() -> Result:
 )
 def test_drawn_triangles_lie_in_the_ground(ground: Ground) -> None:
     room = Room(np.array([-0.2, 0.0]), np.array([0.2, 0.1]), 0.1, 0.0, floor=True)
-    corners = recorded_ground.triangles(ground, *recorded_ground.lines(ground, room))
+    corners = shown_ground.triangles(ground, *shown_ground.lines(ground, room))
     middles = corners.mean(axis=1)
     # Walls stand upright, and have no height of their own.
     flat = np.ptp(corners[..., 0], axis=1) > 1e-9

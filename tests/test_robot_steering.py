@@ -24,7 +24,7 @@ from fivebar_sim.robots.hips import turned
 from fivebar_sim.robots.measure import Trunk
 from fivebar_sim.robots.scenario import RobotScenario
 from fivebar_sim.walking.plan import plan_scenario
-from fivebar_sim.walking.recording import series
+from fivebar_sim.walking.shown.recording import series
 from fivebar_sim.walking.task import WalkTask
 from fivebar_sim.walking.walk import walk
 

@@ -108,8 +108,8 @@ def _execute(order: Order, viewer: str | None, place: Path) -> Result:
 def _streaming(planned: AnyPlan, viewer: str) -> AbstractContextManager[Watch]:
     """Return a context with a watcher that shows a run in a viewer."""
     from fivebar_sim.recording import live
-    from fivebar_sim.walking import live as live_robots
     from fivebar_sim.walking.plan import RobotPlan
+    from fivebar_sim.walking.shown import live as live_robots
 
     if isinstance(planned, RobotPlan):
         return live_robots.streaming(planned, viewer)

@@ -10,7 +10,7 @@ from fivebar_sim.errors import ConfigError
 from fivebar_sim.recording import rrd
 from fivebar_sim.robots.scenario import RobotScenario
 from fivebar_sim.scenario.run import Run
-from fivebar_sim.walking import recording as robots
+from fivebar_sim.walking.shown import recording as robots
 
 if TYPE_CHECKING:
     import rerun as rr

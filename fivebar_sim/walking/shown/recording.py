@@ -31,7 +31,7 @@ from fivebar_sim.robots.measure import Trunk, heading, lean
 from fivebar_sim.robots.scenario import RobotScenario
 from fivebar_sim.scenario.run import Run
 from fivebar_sim.simulation.provenance import identity
-from fivebar_sim.walking import recorded_ground
+from fivebar_sim.walking.shown import ground as shown_ground
 
 if TYPE_CHECKING:
     import rerun as rr
@@ -112,7 +112,7 @@ def _send_run(stream: rr.RecordingStream, run: Run, look: Look, room: Room) -> N
     targets = {leg: points(of_leg(run.record, leg), "target")[rows] for leg in LEGS}
     scene = run.scenario.scene
     if isinstance(scene, Floor) and not scene.ground.level:
-        recorded_ground.log(stream, room, scene.ground, look.root)
+        shown_ground.log(stream, room, scene.ground, look.root)
     log_still(stream, robot, targets, look, on_floor=isinstance(scene, Floor))
     drawn = Drawn(rows, rrd.times(run.record["time"][rows], rows + 1))
     send_moving(stream, robot, run.record, drawn, look, room)

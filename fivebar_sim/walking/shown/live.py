@@ -14,9 +14,10 @@ from fivebar_sim.recording.poses import Room
 from fivebar_sim.robots import LEGS, Floor
 from fivebar_sim.simulation.record import Part
 from fivebar_sim.simulation.steps import States, Watch
-from fivebar_sim.walking import recorded_ground, recording
 from fivebar_sim.walking.plan import RobotPlan
 from fivebar_sim.walking.record import columns
+from fivebar_sim.walking.shown import ground as shown_ground
+from fivebar_sim.walking.shown import recording
 
 if TYPE_CHECKING:
     import rerun as rr
@@ -105,7 +106,7 @@ class _Robot:
             rrd.log_room(self._stream, self._room)
         else:
             rrd.log_room(self._stream, self._room._replace(floor=False))
-            recorded_ground.log(self._stream, self._room, floor.ground, "")
+            shown_ground.log(self._stream, self._room, floor.ground, "")
 
 
 def _room(planned: RobotPlan) -> Room:

@@ -1,0 +1,1 @@
+"""Robots in Rerun: the recording of a run, and a run while it is simulated."""
