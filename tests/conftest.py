@@ -17,6 +17,7 @@ import shared
 from hypothesis import HealthCheck, settings
 from shell import CSV, JUDGED, Shell
 
+from fivebar_sim.cli import arrow
 from fivebar_sim.files import exchange
 from fivebar_sim.runs import coarse
 
@@ -47,7 +48,11 @@ def pytest_collection(session: pytest.Session) -> None:
 
     pytest rewrites their assertions and keeps what it compiled: half of what collecting takes in a
     fresh clone. From one end, all workers would do all of that side by side.
+
+    Every worker imports all of them, so what few of them need of SciPy they import where they use
+    it, and pandas is imported by the tests of data frames alone.
     """
+    arrow.leave_pandas_out()
     worker = os.environ.get("PYTEST_XDIST_WORKER", "gw0")
     here = Path(__file__).parent
     if [Path(each).resolve() for each in session.config.args] != [here]:

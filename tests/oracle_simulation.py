@@ -15,7 +15,6 @@ from typing import Literal
 import numpy as np
 import oracle
 from oracle import Array, Leg
-from scipy.integrate import solve_ivp
 
 Pair = Sequence[float]
 Path = Callable[[float], tuple[Pair, Pair, Pair]]
@@ -202,6 +201,8 @@ def simulate(
             motion opens the loop.
         RuntimeError: The integrator gave up, or crawls (as where B, C and D are in line).
     """
+    from scipy.integrate import solve_ivp
+
     start = oracle.pose(leg, complex(*path(0.0)[0]))
     if oracle.assembly_of(leg, start) != leg.assembly:
         raise ValueError(f"path(0) is in assembly {-leg.assembly}, the leg in {leg.assembly}")

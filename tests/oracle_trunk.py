@@ -18,7 +18,6 @@ from typing import NamedTuple
 import numpy as np
 import oracle
 from oracle import Array, Leg
-from scipy.integrate import solve_ivp
 
 
 class Carried(NamedTuple):
@@ -119,6 +118,8 @@ def integrated(
     Raises:
         RuntimeError: The integrator gave up.
     """
+    from scipy.integrate import solve_ivp
+
     span = (0.0, float(times[-1]))
     result = solve_ivp(slope, span, start, "LSODA", times, rtol=rtol, atol=atol)
     if not result.success:

@@ -8,7 +8,6 @@ from functools import cache
 import numpy as np
 import pytest
 from poses import BATCHES, RIGHT, RIGID, sample
-from scipy import ndimage
 
 from fivebar_sim import kinematics
 from fivebar_sim.analysis import aspects
@@ -104,6 +103,8 @@ def plane(leg: FiveBar) -> tuple[Array, Array]:
 @pytest.mark.parametrize("mode", MODES)
 def test_parts_are_those_of_the_foot_plane(leg: FiveBar, mode: Mode) -> None:
     """Components of a fine grid of feet, a chart that the atlas has not; slivers left out."""
+    from scipy import ndimage
+
     foot, every_mode = plane(leg)
     found = assemblies(leg, foot, mode, every_mode)
     seen = []

@@ -13,7 +13,6 @@ import numpy as np
 import pytest
 from fuzz import Bench, Law, both_forms
 from hypothesis import strategies as st
-from scipy import optimize
 
 from fivebar_sim import Scenario, rollout
 from fivebar_sim.identify import fit, motions
@@ -85,6 +84,8 @@ def sound() -> dict[str, bytes]:
 def bench(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> Bench:
+    from scipy import optimize
+
     few = functools.partial(optimize.least_squares, max_nfev=EVALUATIONS)
     monkeypatch.setattr(motions, "WAVES", dict([*motions.WAVES.items()][:1]))
     monkeypatch.setattr(fit, "_scipy", lambda: SimpleNamespace(least_squares=few))

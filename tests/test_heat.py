@@ -8,7 +8,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
 from sealed import seal
 
 from fivebar_sim import rollout
@@ -71,6 +70,8 @@ def test_temperature_is_where_the_integrated_one_gets_to(rng: np.random.Generato
 
 @pytest.mark.parametrize("part", [0.5, 1.0, 1.4])
 def test_the_time_is_when_the_integrated_one_gets_there(part: float) -> None:
+    from scipy.integrate import solve_ivp
+
     torque = np.array([[0.1, -0.12], [0.1, 0.12]])
     found = heat.heating(torque, WINDING)
     P = WINDING.R * (0.12 / WINDING.kt) ** 2

@@ -8,7 +8,6 @@ from typing import Any, cast
 import numpy as np
 import pytest
 from poses import BATCHES, LINE, RIGHT, RIGID, pose, random_leg, sample, sine
-from scipy.spatial.transform import Rotation
 
 from fivebar_sim import kinematics
 from fivebar_sim.arrays import Array
@@ -41,6 +40,8 @@ def in_plane(h: Hip, foot: Array) -> Array:
 
 def rotated(h: Hip, points: Array, phi: Array) -> Array:
     """Return points turned by SciPy's rotation about the hip's axis."""
+    from scipy.spatial.transform import Rotation
+
     axis = np.array([1.0, 0.0, 0.0] if isinstance(h, SideStep) else [0.0, 0.0, 1.0])
     R = Rotation.from_rotvec(phi.reshape(-1, 1) * axis)
     return R.apply(points.reshape(-1, 3)).reshape(points.shape)

@@ -3,22 +3,23 @@
 from __future__ import annotations
 
 import tomllib
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
+from fivebar_sim.arrays import Array
 from fivebar_sim.cli import main
 from fivebar_sim.errors import ConfigError, LoopOpenError
 from fivebar_sim.geometry import FiveBar
 from fivebar_sim.kinematics.logged import check_closes
-from fivebar_sim.logs import guess, load, read, read_map, survey, text
+from fivebar_sim.logs import Log, guess, load, read, read_map, survey, text
 from fivebar_sim.logs.opening import open_file
 
 FOLDER = Path(__file__).parent / "logs"
 CLASSIC = FiveBar.load("classic")
-TRUTH = load(FOLDER / "truth.csv")
 GUESSED: dict[str, dict[str, Any]] = {
     "dynamixel_wizard.csv": {"time": "ms", "theta_A": "turn/4096", "theta_E": "turn/4096"},
     "excel_german.csv": {"time": "ms", "theta_A": "deg", "theta_E": "deg", "current_A": "mA"},
@@ -27,6 +28,11 @@ GUESSED: dict[str, dict[str, Any]] = {
     "simplefoc.txt": {"rate": 0.0},
     "units_row.csv": {"time": "", "theta_A": "deg", "theta_E": "deg", "current_A": "mA"},
 }
+
+
+@pytest.fixture(scope="module")
+def truth() -> Log:
+    return load(FOLDER / "truth.csv")
 
 
 @pytest.mark.parametrize("file", GUESSED)
@@ -59,7 +65,7 @@ def test_survey_by_blocks_is_that_of_all_rows(monkeypatch: pytest.MonkeyPatch) -
 
 
 def test_log_shows_a_file_and_writes_a_table_to_start_from(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    truth: Log, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     place = tmp_path / "map.toml"
     file = FOLDER / "excel_german.csv"
@@ -69,36 +75,36 @@ def test_log_shows_a_file_and_writes_a_table_to_start_from(
         assert part in said
     assert "the loop of the leg classic closes in every row" in said
     assert tomllib.loads(place.read_text())["log"]["theta_E"]["unit"] == "deg"
-    np.testing.assert_allclose(load(place).pair("theta"), TRUTH.pair("theta"), atol=1e-6)
+    np.testing.assert_allclose(load(place).pair("theta"), truth.pair("theta"), atol=1e-6)
     assert main(["log", str(place)]) == 0
     assert "24 rows, 200 Hz, 0.115 s; 0 gaps" in capsys.readouterr().out
     assert main(["log", str(FOLDER / "excel_german.csv"), "--leg", "classic"]) == 2
     assert "fivebar log" in capsys.readouterr().err
 
 
-MISREAD = {
-    "A and E swapped: exchange": TRUTH.pair("theta")[:, ::-1],
-    "degrees read as radians, a factor of 57.3: unit = 'deg'": np.degrees(TRUTH.pair("theta")),
-    "radians read as degrees, a factor of 57.3": np.radians(TRUTH.pair("theta")),
-    "sign = -1 for both": -TRUTH.pair("theta"),
+MISREAD: dict[str, Callable[[Array], Array]] = {
+    "A and E swapped: exchange": lambda theta: theta[:, ::-1],
+    "degrees read as radians, a factor of 57.3: unit = 'deg'": np.degrees,
+    "radians read as degrees, a factor of 57.3": np.radians,
+    "sign = -1 for both": np.negative,
 }
 
 
 @pytest.mark.parametrize("said", MISREAD)
-def test_angles_that_are_not_the_legs_are_refused_with_a_guess(said: str) -> None:
+def test_angles_that_are_not_the_legs_are_refused_with_a_guess(said: str, truth: Log) -> None:
     with pytest.raises(LoopOpenError, match="first at t = ") as refused:
-        check_closes(CLASSIC, TRUTH.time, MISREAD[said], "bench.csv")
+        check_closes(CLASSIC, truth.time, MISREAD[said](truth.pair("theta")), "bench.csv")
     assert said in str(refused.value)
 
 
-def test_a_loop_that_opens_says_when_and_by_how_much() -> None:
-    theta = TRUTH.pair("theta").copy()
-    check_closes(CLASSIC, TRUTH.time, theta, "bench.csv")
+def test_a_loop_that_opens_says_when_and_by_how_much(truth: Log) -> None:
+    theta = truth.pair("theta").copy()
+    check_closes(CLASSIC, truth.time, theta, "bench.csv")
     # Cranks that point apart: the knees are 30 + 2 x 40 mm apart, and L2 + L3 is 100 mm.
     short = FiveBar(L1=0.04, L2=0.05, L3=0.05, L4=0.04, L5=0.03)
     theta[7] = (np.pi, 0.0)
     with pytest.raises(LoopOpenError) as refused:
-        check_closes(short, TRUTH.time, theta, "bench.csv")
+        check_closes(short, truth.time, theta, "bench.csv")
     assert refused.value.index == (7,)
     said = str(refused.value)
     assert "in 4.17 % of rows: first at t = 0.035 s, where the knees are 10 mm too far" in said
@@ -123,8 +129,8 @@ def test_wrong_tables_are_refused_by_their_key(said: str) -> None:
     assert said in str(refused.value)
 
 
-def test_start_and_end_choose_rows() -> None:
+def test_start_and_end_choose_rows(truth: Log) -> None:
     table = {"time": "time", "theta_A": "theta_A", "start": 0.02, "end": "50 ms"}
     found = read(FOLDER / "truth.csv", read_map(table, "log"))
-    np.testing.assert_allclose(found.time, TRUTH.time[:7])
-    np.testing.assert_array_equal(found.channels["theta_A"], TRUTH.channels["theta_A"][4:11])
+    np.testing.assert_allclose(found.time, truth.time[:7])
+    np.testing.assert_array_equal(found.channels["theta_A"], truth.channels["theta_A"][4:11])

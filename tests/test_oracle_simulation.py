@@ -19,7 +19,6 @@ from oracle_simulation import (
     knee_rates,
     simulate,
 )
-from scipy.integrate import simpson
 
 from fivebar_sim.geometry import FiveBar
 
@@ -98,6 +97,8 @@ def test_free_swing_keeps_its_energy(
 
 @LEGS
 def test_energy_gained_is_work_done(leg: Leg) -> None:
+    from scipy.integrate import simpson
+
     force = 0.5 + 1.0j
     times = np.linspace(0.0, 0.2, 2001)
     motion = simulate(leg, PLAIN, ELLIPSE, 0.2, times, foot_force=lambda t: force * math.sin(9 * t))

@@ -14,7 +14,6 @@ import pytest
 from oracle import Array, Leg
 from oracle_simulation import Pair, Path, Servo
 from oracle_stance import Ground, Stance, simulate
-from scipy.integrate import simpson
 
 from fivebar_sim.geometry import FiveBar
 
@@ -49,6 +48,8 @@ def path_of(name: str, *, still: bool = False) -> Path:
 @GRIPS
 def test_energy_grows_by_the_work_of_the_motors_alone(name: str, grips: bool) -> None:
     """The floor does no work: N has nothing to move, T nothing that slides."""
+    from scipy.integrate import simpson
+
     motion = squat(name, grips=grips)
     theta_dot = np.gradient(motion.theta, TIMES, axis=0, edge_order=2)
     power = np.sum(motion.tau * theta_dot, axis=-1)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from scipy.interpolate import CubicSpline
 
 from fivebar_sim.paths.spline import Spline
 
@@ -21,6 +20,8 @@ def points(rng: np.random.Generator, count: int, periodic: bool) -> np.ndarray:
 
 def assert_as_scipy(time: np.ndarray, point: np.ndarray, at: np.ndarray, periodic: bool) -> None:
     """Compare the curve and its derivatives, each as far as its own size and the knots allow."""
+    from scipy.interpolate import CubicSpline
+
     expected = CubicSpline(time, point, bc_type=ENDS[periodic])
     found = Spline.through(time, point, periodic=periodic).evaluate(at)
     length = np.diff(time)

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from itertools import product
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
-from scipy.spatial.transform import Rotation
 
 from fivebar_sim.arrays import Array
 from fivebar_sim.robots import measure
 from fivebar_sim.robots.measure import Trunk
+
+if TYPE_CHECKING:
+    from scipy.spatial.transform import Rotation
 
 SIZE = (0.12, 0.05, 0.03)
 CENTER = np.array([0.01, 0.0, 0.005])
@@ -24,6 +27,8 @@ def trunk(position: Array, turned: Rotation) -> Trunk:
 
 def about(axis: str, angle: Array) -> Rotation:
     """Return the rotations about an axis by some angles [rad], (N,)."""
+    from scipy.spatial.transform import Rotation
+
     return Rotation.from_euler(axis, angle[:, None])
 
 
@@ -56,6 +61,8 @@ def test_side_step_is_drift() -> None:
 
 
 def test_lean_and_lowest_corner_in_any_pose(rng: np.random.Generator) -> None:
+    from scipy.spatial.transform import Rotation
+
     turned = Rotation.random(200, rng=rng)
     place = rng.uniform(-1.0, 1.0, (200, 3))
     body = trunk(place, turned)
@@ -83,5 +90,7 @@ def test_falls_are_counted_from_each_time_it_was_up() -> None:
 
 
 def test_upright_robot_does_not_fall() -> None:
+    from scipy.spatial.transform import Rotation
+
     place = np.full((10, 3), 0.1)
     assert measure.falls(trunk(place, Rotation.identity(10)), SIZE, CENTER) == []
