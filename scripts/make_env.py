@@ -23,12 +23,13 @@ import fcntl
 import hashlib
 import json
 import os
+import re
 import shutil
 import signal
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import NoReturn
@@ -48,6 +49,9 @@ INSTALL = ["install", "--quiet", "--disable-pip-version-check", "--no-input", "-
 
 FROM_LOCK = ["--require-hashes", "--only-binary=:all:", "--no-compile"]
 """No build from source, which may need a compiler; bytecode is written for what is imported."""
+
+PIPS = min(4, os.cpu_count() or 1)
+"""How many pips share a lock; no package stands in two parts of it."""
 
 NETWORK = "the package index cannot be reached (is there a network?)"
 NO_VENV = "this Python lacks a part of venv or pip (Debian: apt install python3-venv)"
@@ -99,31 +103,64 @@ def shortened(line: str) -> str:
 
 def call(*command: str | Path) -> str:
     """Return the output of a command that must succeed."""
+    return call_all([command])[0]
+
+
+def call_all(commands: Sequence[Sequence[str | Path]]) -> list[str]:
+    """Return the outputs of commands that run side by side; all must succeed."""
+    programs: list[subprocess.Popen[str]] = []
+    try:
+        for command in commands:
+            programs.append(start(command))
+        outputs = [program.communicate()[0] for program in programs]
+    except BaseException:
+        for program in programs:
+            if program.poll() is None:
+                os.killpg(program.pid, signal.SIGKILL)
+                program.wait()
+        raise
+
+    # One that fails lets the others end: a pip that is killed leaves half a package.
+    for program, output in zip(programs, outputs, strict=True):
+        if program.returncode:
+            raise SetUpError(explain(output))
+    return outputs
+
+
+def start(command: Sequence[str | Path]) -> subprocess.Popen[str]:
+    """Start a command."""
     # A user's settings for other environments must not send packages elsewhere.
     aside = {"PIP_TARGET", "PIP_PREFIX", "PIP_ROOT", "PIP_NO_BINARY", "PYTHONHOME", "PYTHONPATH"}
     env = {key: value for key, value in os.environ.items() if key not in aside}
     env |= {"PIP_USER": "0", "PIP_REQUIRE_VIRTUALENV": "0"}
 
-    words = [str(part) for part in command]
     # A group of its own: what pip and venv start ends with them.
-    program = subprocess.Popen(
-        words,
+    return subprocess.Popen(
+        [str(part) for part in command],
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
         text=True,
         env=env,
         start_new_session=True,
     )
-    try:
-        output, _ = program.communicate()
-    except BaseException:
-        os.killpg(program.pid, signal.SIGKILL)
-        program.wait()
-        raise
 
-    if program.returncode:
-        raise SetUpError(explain(output))
-    return output
+
+def dealt(lock: str, hands: int) -> list[str]:
+    """Return a lock's requirements dealt out, each in the line in which the lock has it.
+
+    So pip names the lock's own line where it complains.
+    """
+    whole = re.split(r"(?<!\\)\n", lock)  # a requirement and its hashes are one line
+    blank = [line.count("\n") * "\n" for line in whole]
+    places = [k for k, line in enumerate(whole) if line and not line.lstrip().startswith("#")]
+
+    parts = []
+    hands = max(1, min(hands, len(places)))
+    for hand in range(hands):
+        mine = set(places[hand::hands])
+        lines = [line if k in mine else blank[k] for k, line in enumerate(whole)]
+        parts.append("\n".join(lines))
+    return parts
 
 
 def interrupt(number: int, frame: object) -> NoReturn:
@@ -177,6 +214,22 @@ class Environment:
         """Return the output of the environment's own pip."""
         return call(self.python, "-m", "pip", *args)
 
+    def install(self, lock: Path) -> None:
+        """Install a lock by several pips side by side: each unpacks on one processor alone."""
+        with tempfile.TemporaryDirectory() as folder:
+            commands = []
+            for number, part in enumerate(dealt(lock.read_text(encoding="utf-8"), PIPS)):
+                file = Path(folder) / str(number) / lock.name
+                file.parent.mkdir()
+                file.write_text(part, encoding="utf-8")
+                commands.append([self.python, "-m", "pip", *INSTALL, *FROM_LOCK, "-r", file])
+
+            try:
+                call_all(commands)
+            except SetUpError as error:
+                said = re.sub(rf"{re.escape(folder)}/\d+", str(lock.parent), str(error))
+                raise SetUpError(said) from None
+
     def make(self, pip: str | None) -> None:
         """Make an empty environment, with this Python's pip or another release of it."""
         self.record.unlink(missing_ok=True)
@@ -203,7 +256,7 @@ def set_up(root: Path, kind: str, pip: str | None = None) -> None:
         try:
             env.make(pip)
             with env.part(locks[0], base):
-                env.pip(*INSTALL, *FROM_LOCK, "-r", root / locks[0])
+                env.install(root / locks[0])
         except BaseException:
             shutil.rmtree(env.place, ignore_errors=True)
             raise
@@ -213,7 +266,7 @@ def set_up(root: Path, kind: str, pip: str | None = None) -> None:
         if env.holds().get(lock) != mark:
             print(f"Adding {ADDS[lock]} ...", flush=True)
             with env.part(lock, mark):
-                env.pip(*INSTALL, *FROM_LOCK, "-r", root / lock)
+                env.install(root / lock)
             if lock == "requirements-dev.lock":
                 say_what_is_left_out()
 

@@ -37,7 +37,8 @@ class Pip:
         self.commands: list[str] = []
         self.fails_on = "nothing"
         self.watch: Callable[[str], None] = lambda line: None
-        monkeypatch.setattr(make_env, "call", self)
+        monkeypatch.setattr(make_env, "PIPS", 2)
+        monkeypatch.setattr(make_env, "call_all", lambda each: [self(*command) for command in each])
 
     def __call__(self, *command: str | Path) -> str:
         """Do as the command would."""
@@ -55,7 +56,7 @@ class Pip:
         """Return the locks that were installed since the last question."""
         found = [line for line in self.commands if "--require-hashes" in line]
         self.commands.clear()
-        return [line.split("/")[-1] for line in found]
+        return list(dict.fromkeys(line.split("/")[-1] for line in found))
 
 
 @pytest.fixture
@@ -68,6 +69,40 @@ def root(tmp_path: Path) -> Path:
     for file in ("pyproject.toml", *LOCKS):
         (tmp_path / file).write_text(f"# {file}\n", encoding="utf-8")
     return tmp_path
+
+
+def test_each_requirement_is_installed_by_one_pip(tmp_path: Path, pip: Pip) -> None:
+    """In the lines of the lock, which pip names where it complains."""
+    lock = tmp_path / "a.lock"
+    lock.write_text("# all\na==1 \\\n    --hash=x\n    # via b\nb==2 --hash=y\nc==3\n", "utf-8")
+    parts: list[list[str]] = []
+    pip.watch = lambda line: parts.append(Path(line.split()[-1]).read_text("utf-8").splitlines())
+    make_env.Environment(tmp_path).install(lock)
+    first = ["", "a==1 \\", "    --hash=x", "", "", "c==3"]
+    second = ["", "", "", "", "b==2 --hash=y", ""]
+    assert parts == [first, second]
+
+
+def test_complaint_names_the_lock_itself(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(commands: list[list[str | Path]]) -> None:
+        raise make_env.SetUpError(f"no requirement: x (from line 3 of {commands[0][-1]})")
+
+    monkeypatch.setattr(make_env, "call_all", refuse)
+    lock = tmp_path / "a.lock"
+    lock.write_text("a==1\nb==2\nx\n", "utf-8")
+    with pytest.raises(make_env.SetUpError, match=rf"from line 3 of {lock}\)$"):
+        make_env.Environment(tmp_path).install(lock)
+
+
+def test_one_that_fails_lets_the_others_end(tmp_path: Path) -> None:
+    """A pip that is killed leaves half a package; the first that failed is told."""
+    late = (
+        f"import pathlib, time; time.sleep(0.2); pathlib.Path({str(tmp_path)!r}, 'whole').touch()"
+    )
+    programs = [[sys.executable, "-c", code] for code in ("1 / 0", late)]
+    with pytest.raises(make_env.SetUpError, match="ZeroDivisionError"):
+        make_env.call_all(programs)
+    assert (tmp_path / "whole").exists()
 
 
 BOTH = ["requirements.lock", "requirements-dev.lock"]
