@@ -214,7 +214,11 @@ def register() -> None:
             )
 
     if "fivebar/Walk-v0" not in gymnasium.registry:
-        gymnasium.register("fivebar/Walk-v0", entry_point="fivebar_sim.walking.env:WalkEnv")
+        gymnasium.register(
+            "fivebar/Walk-v0",
+            entry_point="fivebar_sim.walking.env:WalkEnv",
+            vector_entry_point="fivebar_sim.walking.episodes.vector:WalkVectorEnv",
+        )
 
 
 register()

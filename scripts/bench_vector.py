@@ -1,10 +1,11 @@
 """Print how fast legs are as environments, beside what steps their physics.
 
-.venv/bin/python scripts/bench_vector.py [--legs 64] [--threads 2] [--resets 100000]
+.venv/bin/python scripts/bench_vector.py [--legs 64] [--robots 16] [--threads 2] [--resets 100000]
 
 Physics steps a second: `Batch.step` alone with the same commands, the vector environment, one
 Gymnasium and one dm_control environment, by turns in one run, medians. With --resets, resets of one
-environment, and what memory they took.
+environment, and what memory they took. Of robots that learn to walk: the vector environment beside
+Gymnasium's of single ones, one after the other, and beside plain `mj_step`s of all of them.
 """
 
 from __future__ import annotations
@@ -16,15 +17,21 @@ import time
 import warnings
 from collections.abc import Callable
 from itertools import cycle
+from typing import Any
 
+import mujoco
 import numpy as np
+from gymnasium.vector import SyncVectorEnv
 from mujoco.batch import Batch
 
-from fivebar_sim import tasks
+from fivebar_sim import model, tasks
 from fivebar_sim.arrays import Array
 from fivebar_sim.gym import LegEnv
+from fivebar_sim.robots import Floor
 from fivebar_sim.tasks import legs as leg_group
 from fivebar_sim.vector import LegVectorEnv
+from fivebar_sim.walking.env import WalkEnv
+from fivebar_sim.walking.episodes.vector import WalkVectorEnv
 
 with warnings.catch_warnings():  # glfw's, where there is no screen
     warnings.simplefilter("ignore")
@@ -115,16 +122,60 @@ def show(kind: str, legs: int, threads: int, rounds: int = 15) -> None:
         "one Gymnasium environment": single(task),
         "one dm_control environment": dm_control(task),
     }
+    print(f"{kind}: {legs} legs, {threads} threads, {task.every} physics steps a control step")
+    compare(steppers, rounds)
+
+
+def compare(steppers: dict[str, Stepper], rounds: int) -> None:
+    """Print the median rate of each by turns, and that of the vector environment over it."""
     rates: dict[str, list[float]] = {name: [] for name in steppers}
     for _ in range(rounds):
         for name, step in steppers.items():
             rates[name].append(rate(step))
 
-    print(f"{kind}: {legs} legs, {threads} threads, {task.every} physics steps a control step")
     ours = rates["vector environment"]
     for name, found in rates.items():
         part = statistics.median(a / b for a, b in zip(ours, found, strict=True))
         print(f"  {name:28} {statistics.median(found):9,.0f} steps/s   vector / it: {part:.2f}")
+
+
+def walking(robots: int, threads: int) -> dict[str, Stepper]:
+    """Return what steps robots: our vector environment, Gymnasium's, and MuJoCo alone."""
+    options: dict[str, Any] = {"span": 0.1, "duration": 100.0}
+    ours = WalkVectorEnv("q8bot", robots, threads, **options)
+    theirs = SyncVectorEnv([lambda: WalkEnv("q8bot", **options)] * robots)
+    ours.reset(seed=0)
+    theirs.reset(seed=0)
+    task = ours.task
+    shake = np.random.default_rng(0).uniform(-1.0, 1.0, (ROWS, robots, 8))
+    built = model.build_robot(task.robot, Floor(), timestep=task.timestep)
+    data = [mujoco.MjData(built) for _ in range(robots)]
+    for each in data:
+        mujoco.mj_resetDataKeyframe(built, each, built.key("stand").id)
+    standing = data[0].ctrl.copy()
+
+    def plain() -> int:
+        row = next(rows)
+        for each, own in zip(data, row, strict=True):
+            each.ctrl[:] = standing + task.span * own
+            mujoco.mj_step(built, each, task.every)
+        return robots * task.every
+
+    def of(env: Any) -> Stepper:
+        actions = cycle(shake)
+
+        def step() -> int:
+            env.step(next(actions))
+            return robots * task.every
+
+        return step
+
+    rows = cycle(shake)
+    return {
+        "vector environment": of(ours),
+        "Gymnasium's SyncVectorEnv": of(theirs),
+        "plain mj_step, one thread": plain,
+    }
 
 
 def show_resets(count: int) -> None:
@@ -145,11 +196,15 @@ def main() -> None:
     """Print every task's rates, and the resets."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--legs", type=int, default=64)
+    parser.add_argument("--robots", type=int, default=16)
     parser.add_argument("--threads", type=int, default=2)
     parser.add_argument("--resets", type=int, default=0)
     chosen = parser.parse_args()
-    for kind in tasks.KINDS:
+    for kind in tasks.KINDS if chosen.legs else ():
         show(kind, chosen.legs, chosen.threads)
+    if chosen.robots:
+        print(f"walk: {chosen.robots} robots, {chosen.threads} threads")
+        compare(walking(chosen.robots, chosen.threads), rounds=15)
     if chosen.resets:
         show_resets(chosen.resets)
 

@@ -33,9 +33,9 @@ class Outcome(NamedTuple):
         observation: The observations, (n, size).
         reward: Weighted sum of the terms, (n,).
         terms: Reward terms by name, (n,) each.
-        terminated: Whether a leg has failed, and why see `reason`, (n,).
+        terminated: Whether a leg has failed or a robot fallen, and why see `reason`, (n,).
         truncated: Whether the episode's duration is over, (n,).
-        reason: Index in REASONS, (n,).
+        reason: Index in REASONS, of robots the words themselves, (n,).
     """
 
     observation: Array
@@ -43,7 +43,7 @@ class Outcome(NamedTuple):
     terms: dict[str, Array]
     terminated: Bools
     truncated: Bools
-    reason: NDArray[np.int64]
+    reason: NDArray[Any]
 
 
 class Episodes:

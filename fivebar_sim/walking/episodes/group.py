@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -14,30 +14,11 @@ from fivebar_sim.arrays import Array, Bools
 from fivebar_sim.errors import ArgumentError
 from fivebar_sim.kinematics.stops import SPEED_LIMIT
 from fivebar_sim.robots import Floor, Robot
+from fivebar_sim.tasks.episodes import Outcome
 from fivebar_sim.tasks.stepped import SteppedLegs
 from fivebar_sim.walking.draws import draw_robot
 from fivebar_sim.walking.episodes.episode import TERMS, Episode, Period
 from fivebar_sim.walking.task import WalkTask
-
-
-class Outcome(NamedTuple):
-    """What agents get after a control period, or at the start of an episode.
-
-    Attributes:
-        observation: The observations, (n, size).
-        reward: Sum of the terms, (n,).
-        terms: Terms of the reward by name, (n,) each.
-        terminated: Whether a robot fell, (n,).
-        truncated: Whether the episode's duration is over, (n,).
-        reason: Why it ended, "" if it did not, (n,).
-    """
-
-    observation: Array
-    reward: Array
-    terms: dict[str, Array]
-    terminated: Bools
-    truncated: Bools
-    reason: NDArray[np.str_]
 
 
 class WalkGroup:
