@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import pickle
+
 import numpy as np
 import pytest
 from test_clipping import CASES
@@ -12,10 +14,14 @@ from fivebar_sim.robots.scenario import RobotScenario
 from fivebar_sim.scenario import Scenario
 from fivebar_sim.simulation.plan import Plan
 from fivebar_sim.simulation.steps import States, simulate
+from fivebar_sim.tasks.stepped import SteppedLegs
 from fivebar_sim.walking.plan import plan_scenario
 
 # What MuJoCo warns of in the second step.
 WILD = ["controller.feedforward=torque", "servo={kp=1e7, kd=0.0, limit=1e6}"]
+
+
+TIGHT = ["servo={kp=8.0, kd=0.05, limit=0.004}"]
 
 
 def planned(name: str, sets: list[str]) -> tuple[Plan, Array]:
@@ -55,6 +61,24 @@ def test_a_leg_that_breaks_down_alone_repeats_its_last_state() -> None:
     alone = simulate(plan.model, plan.start[None], part[None])
     assert alone.warnings[0] > 0
     assert not differing(alone, both)
+
+
+@pytest.mark.parametrize("name", ["classic-ellipse", "payload-xl330"])
+def test_one_leg_that_begins_again_has_the_bits_of_one_beside_others(name: str) -> None:
+    plan, ctrl = planned(name, TIGHT if name == "classic-ellipse" else [])
+    start = plan.start[None]
+    part = ctrl[None, :40]
+    one = SteppedLegs([plan.model], start, 1)
+    two = SteppedLegs([plan.model] * 2, np.tile(start, (2, 1)), 1)
+    for legs in (one, two):
+        legs.moved(np.tile(part, (legs._batch.nsim, 1, 1)))
+        legs.restart(np.array([0]), start + 1e-3)
+
+    alone = pickle.loads(pickle.dumps(one)).moved(part)
+    beside = two.moved(np.tile(part, (2, 1, 1)))
+    assert alone[0].tobytes() == one.moved(part)[0].tobytes()
+    for first, second in zip(alone, beside, strict=True):
+        assert first[0].tobytes() == np.ascontiguousarray(second[0]).tobytes()
 
 
 def test_a_robot_alone_has_the_bits_of_one_beside_others() -> None:

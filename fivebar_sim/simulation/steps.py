@@ -116,9 +116,14 @@ class Legs:
         self._clipping = Clipping.of(everyone)
         # One alone is looked at step by step; many are looked at together.
         single = len(qpos) == 1 and not self.whole
-        self._alone = Alone(first, self._batch, self._clipping) if single else None
+        self._alone = self._single(first) if single else None
         self._sizes = first.nq, first.nv, first.nu
         self._ground = recorded_columns(first)
+
+    def _single(self, model: mujoco.MjModel) -> Alone:
+        """Return the one simulation that there is."""
+        friction = None if self._gears is None else self._batch.expand("dof_frictionloss")
+        return Alone(model, self._batch, self._clipping, friction)
 
     def advance(self, ctrl: Array) -> States:
         """Return the states of the next steps.
@@ -133,7 +138,7 @@ class Legs:
         out = self._taken(ctrl, record)
         # A step that keeps a torque limit may have been sent another command.
         arrays = [out[STATE], *(out[name] for name in record[1:])]
-        return self.states(arrays, ctrl.copy(), self.warned())
+        return self.states(arrays, ctrl.copy(), self._batch.warning)
 
     def moved(self, ctrl: Array) -> tuple[Array, Array, NDArray[Any]]:
         """Return qpos and qvel after the next steps, (nsim, n, nq), and the warnings so far.
@@ -142,7 +147,7 @@ class Legs:
         """
         state = self._taken(ctrl, (STATE,))[STATE]
         nq, nv, _ = self._sizes
-        warnings = self.warned()[..., 1].sum(axis=1)
+        warnings = self._batch.warning[..., 1].sum(axis=1)
         return state[..., 1 : 1 + nq], state[..., 1 + nq : 1 + nq + nv], warnings
 
     def _taken(self, ctrl: Array, record: Sequence[Any]) -> dict[Any, Array]:
@@ -157,8 +162,7 @@ class Legs:
         with without_log(), without_clock():
             if self._gears is None:
                 return self._rollout(ctrl, record)
-            turning = self._batch if self._alone is None else self._alone
-            return rubbed(turning, self._gears, ctrl, record, self._rollout)
+            return rubbed(self._batch, self._gears, ctrl, record, self._rollout)
 
     def _rollout(self, ctrl: Array, record: Sequence[Any]) -> dict[Any, Array]:
         """Return what is recorded of the next steps, with torque limits kept."""
@@ -216,7 +220,7 @@ class Legs:
 
     def warned(self) -> NDArray[Any]:
         """Return MuJoCo's warnings of each simulation as they are now, (nsim, kinds, 2)."""
-        return self._batch.warning if self._alone is None else self._alone.warning
+        return self._batch.warning
 
     def once(self, ctrl: Array) -> None:
         """Take one step with finite commands, (nsim, nu)."""

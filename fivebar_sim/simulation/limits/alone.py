@@ -34,35 +34,30 @@ BEGIN = 512
 
 
 class Alone:
-    """One leg or robot; as much of `mujoco.batch.Batch` as is needed of it.
+    """One leg or robot, whose state is its batch's before and after every call.
 
     Args:
-        model: Its model, of which `expand` is written.
-        batch: A batch of it alone, in the state that it begins in.
+        model: Its model, which no other has: its friction is changed.
+        batch: A batch of it alone.
         clipping: Its servos; None without torque limits.
-
-    Attributes:
-        qpos, qvel: Its state, (1, ...).
-        warning: (last info, count) of each kind of MuJoCo's warnings, (1, kinds, 2).
+        friction: Its joints' friction before each call, (1, nv); None where it does not change.
     """
 
-    def __init__(self, model: mujoco.MjModel, batch: Batch, clipping: Clipping | None) -> None:
+    def __init__(
+        self,
+        model: mujoco.MjModel,
+        batch: Batch,
+        clipping: Clipping | None,
+        friction: Array | None,
+    ) -> None:
         self._model = model
         self._data = mujoco.MjData(model)
         self._batch = batch
-        mujoco.mj_setState(model, self._data, batch.state[0], WHOLE)
-
-        self.qpos = self._data.qpos[None]
-        self.qvel = self._data.qvel[None]
-        self.warning = batch.warning.copy()
+        self._friction = friction
 
         self._warnings = self._data.warning.number
         self._servos = None if clipping is None else Servos(clipping, self._data)
         self._right = BEGIN
-
-    def expand(self, name: str) -> Array:
-        """Return a field of the model, (1, ...), to be written."""
-        return getattr(self._model, name)[None]
 
     def rollout(self, ctrl: Array, record: Sequence[Any]) -> dict[Any, Array]:
         """Return what is recorded after each step; after a warning the last records repeat.
@@ -72,6 +67,10 @@ class Alone:
             record: What to record.
         """
         steps = ctrl.shape[1]
+        state = self._batch.state[0]
+        mujoco.mj_setState(self._model, self._data, state, WHOLE)
+        if self._friction is not None:
+            self._model.dof_frictionloss[:] = self._friction[0]
         rows = _Rows(self._model, self._data, record, steps)
         servos = self._servos
         warned = self._warnings.tolist()
@@ -93,9 +92,11 @@ class Alone:
             k += 1
             if self._warnings.tolist() != warned:
                 rows.repeat(k)
+                self._batch.warning[0, :, 0] = self._data.warning.lastinfo
+                self._batch.warning[0, :, 1] += self._warnings - np.array(warned)
                 break
 
-        self.warning[0, :, 1] = self._warnings
+        mujoco.mj_getState(self._model, self._data, state, WHOLE)
         return rows.arrays
 
     def _together(self, servos: Servos, ctrl: Array, rows: _Rows, k: int) -> int:
@@ -108,6 +109,7 @@ class Alone:
 
         # The step in question is found singly: this is still in the state before.
         if (self._batch.warning != warned).any():
+            self._batch.warning[:] = warned
             self._right = 0
             return 0
 
