@@ -179,13 +179,13 @@ def _moved(preset: str, feedforward: str, times: Array) -> tuple[Array, Array]:
     return motion.foot, motion.tau
 
 
-def measure(keys: Sequence[Key], nthread: int = 2) -> dict[Key, Error]:
-    """Return the errors of runs, all of one call simulated together."""
+def measure(keys: Sequence[Key], nthread: int = 2, device: str | None = None) -> dict[Key, Error]:
+    """Return the errors of runs, all of one call simulated together, on a device if named."""
     plans = []
     for key in keys:
         leg = FiveBar.load(key.preset)
         plans.append(rollout.plan(scenario(leg, around_rest(leg), gains(key.preset), key)))
-    results = rollout.run_all(plans, nthread)
+    results = rollout.run_all(plans, nthread, device=device)
     sensed = sensors(plans, nthread)
     timesteps = tuple(sorted({key.timestep for key in keys}))
     return {

@@ -110,11 +110,16 @@ def _truth(
     )
 
 
-def measure(key: Key, *, hard: bool = False, duration: float = DURATION) -> Error:
-    """Return the errors of a squat without friction, duration [s] long."""
+def measure(
+    key: Key, *, hard: bool = False, duration: float = DURATION, device: str | None = None
+) -> Error:
+    """Return the errors of a squat without friction, duration [s] long, on a device if named."""
     plan = planned(key, duration=duration)
     known = truth(key.preset, key.feedforward, duration)
-    return _compared(rollout.execute(harden(plan) if hard else plan), known)
+    if hard:
+        plan = harden(plan)
+    (result,) = rollout.run_all([plan], device=device)
+    return _compared(result, known)
 
 
 class Grip(NamedTuple):
