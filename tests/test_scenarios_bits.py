@@ -58,6 +58,17 @@ def test_by_plain_steps(alone: list[Result], every: int, monkeypatch: pytest.Mon
         same_bits(rollout.run(result.scenario), result)
 
 
+def test_stand_in_has_all_that_the_package_takes_from_batch() -> None:
+    module = runpy.run_path(str(WORKER))["stand_in"]()
+    package = Path(rollout.__file__).parent
+    lines = [line for path in package.rglob("*.py") for line in path.read_text().splitlines()]
+    begin = "from mujoco.batch import "
+    taken = [line.strip().removeprefix(begin) for line in lines if line.strip().startswith(begin)]
+    names = {name.strip() for each in taken for name in each.split(",")}
+    assert "Batch" in names
+    assert not names - set(vars(module))
+
+
 @pytest.mark.long
 def test_other_processes() -> None:
     def run(seed: str, *options: str) -> Any:
