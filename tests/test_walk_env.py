@@ -87,13 +87,17 @@ def test_robot_does_what_walk_simulates() -> None:
 
 
 def test_a_seed_says_all_and_draws_within_the_ranges() -> None:
-    made = env(randomise={"mass": [0.8, 0.9]}, gyro_noise=0.1, duration=0.06)
+    options: dict[str, Any] = {"randomise": {"mass": [0.8, 0.9]}, "gyro_noise": 0.1}
+    made = env(duration=0.06, **options)
     first = played(made, 3)
     mass = made.robot.mass
     assert 0.8 * ROBOT.mass <= mass <= 0.9 * ROBOT.mass
     np.testing.assert_array_equal(first, played(made, 3))
-    assert not np.array_equal(first[0], played(made, 4)[0])
+    second = played(made, 4)
+    assert not np.array_equal(first[0], second[0])
     assert made.robot.mass != mass
+    # Nothing is left of the robot before.
+    np.testing.assert_array_equal(second, played(env(duration=0.06, **options), 4))
     assert first.shape[1] == sum(PARTS.values())
 
 
