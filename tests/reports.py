@@ -87,6 +87,9 @@ def unfitted() -> Iterator[None]:
     """Draw figures without fitting their axes to their words, which takes half of the time."""
     from matplotlib.layout_engine import ConstrainedLayoutEngine
 
+    from fivebar_sim.render.fitted import Fitted
+
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(ConstrainedLayoutEngine, "execute", lambda engine, figure: None)
+        for engine in (ConstrainedLayoutEngine, Fitted):
+            patch.setattr(engine, "execute", lambda engine, figure: None)
         yield

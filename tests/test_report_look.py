@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import re
 from itertools import pairwise
 
@@ -98,6 +99,31 @@ def test_svg_of_two_figures_in_one_page() -> None:
         assert set(re.findall(r'(?:url\(#|href="#)([^")]+)', text)) == set(ids)
         assert "http" not in text
         assert not re.search(r' d="[^"]*\.\d{3}', text)
+
+
+@pytest.mark.parametrize("legend", [False, True])
+def test_words_of_panels_are_on_the_paper_and_apart(legend: bool) -> None:
+    """Wide numbers, a factor above them, titles, a legend: each has its own place."""
+    with look.project_style():
+        figure, panels = draw.panels(1, 1, height=4.6)
+        for ax, size in zip(panels, (1e-9, -123456.0), strict=True):
+            ax.plot([0.0, 0.7], [0.0, size], label="a line")
+            ax.set(ylabel="force on the foot [N]")
+            ax.set_title("A: RMS", loc="left")
+        if legend:
+            figure.legend(loc="outside upper center")
+        figure.draw_without_rendering()
+
+    found = [ax.get_tightbbox() for ax in panels]
+    boxes = [box for box in found if box is not None]
+    boxes += [shown.get_window_extent() for shown in figure.legends]
+    assert len(boxes) == 2 + legend
+    for box in boxes:
+        assert box.x0 >= figure.bbox.x0
+        assert box.x1 <= figure.bbox.x1
+        assert box.y0 >= figure.bbox.y0
+        assert box.y1 <= figure.bbox.y1
+    assert not any(one.overlaps(other) for one, other in itertools.combinations(boxes, 2))
 
 
 def test_shading_of_stance_is_where_the_foot_stands() -> None:

@@ -90,7 +90,9 @@ def panels(*shares: float, height: float) -> tuple[Figure, list[Axes]]:
     """
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(WIDTH, height), layout="constrained")
+    from fivebar_sim.render.fitted import Fitted
+
+    figure = Figure(figsize=(WIDTH, height), layout=Fitted())
     axes = figure.subplots(
         len(shares), 1, sharex=True, squeeze=False, gridspec_kw={"height_ratios": shares}
     )[:, 0]

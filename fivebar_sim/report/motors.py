@@ -14,7 +14,7 @@ from fivebar_sim.metrics.columns import motors as columns
 from fivebar_sim.metrics.limits import look_up
 from fivebar_sim.report import axes, draw, numbers
 from fivebar_sim.report.draw import Drawn
-from fivebar_sim.report.look import WIDTH, colour
+from fivebar_sim.report.look import colour
 from fivebar_sim.runs.stored import StoredRun
 
 if TYPE_CHECKING:
@@ -88,10 +88,8 @@ def power(run: StoredRun) -> Drawn:
 
 def torque_speed(run: StoredRun) -> Drawn:
     """Draw torque against speed in the measured time, inside what the servo can give."""
-    from matplotlib.figure import Figure
+    figure, (ax,) = draw.panels(1, height=2.9)
 
-    figure = Figure(figsize=(WIDTH, 2.9), layout="constrained")
-    ax = figure.add_subplot()
     window = run.scenario.window
     fastest, largest = (
         float(np.abs(columns(run.record, name)[window]).max()) for name in ("theta_dot", "torque")

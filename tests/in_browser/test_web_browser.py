@@ -54,6 +54,7 @@ def test_the_leg_is_in_sight_and_nothing_leaves_the_machine(
     rrd.write(tmp_path / "a.rrd", [result])
     asked: list[str] = []
     told: list[str] = []
+
     with web.Server(0) as server:
         server.pages = web.pages(tmp_path / "a.rrd", "ellipse")
         threading.Thread(target=server.serve_forever, daemon=True).start()
@@ -73,6 +74,7 @@ def test_the_leg_is_in_sight_and_nothing_leaves_the_machine(
         title = page.title()
         page.close()
         server.shutdown()
+
     assert min(seen) >= ENOUGH, f"pixels of L1, L2, L3, L4: {seen}"
     assert title == "ellipse"
     names = {urlsplit(url).path for url in asked}
