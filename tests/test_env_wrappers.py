@@ -17,7 +17,7 @@ from fivebar_sim import kinematics
 from fivebar_sim.control.servo import Servo
 from fivebar_sim.errors import ConfigError
 from fivebar_sim.gym import LegEnv
-from fivebar_sim.render.leg_picture import LegPicture
+from fivebar_sim.tasks.pictures import Pictures
 from fivebar_sim.vector import LegVectorEnv
 
 ONE = np.float64(1.0)
@@ -209,7 +209,7 @@ def test_picture_has_a_shadow_as_fine_as_it_is() -> None:
     seen = []
     try:
         for model in (env.model, bare):
-            picture = LegPicture(model, env.task.leg, width=64, height=48)
+            picture = Pictures.of(None, 64, 48).of_leg(model, env.task.leg)
             assert picture._model.vis.quality.shadowsize == 128
             seen.append(picture.take(model.key("home").qpos))
             picture.close()
