@@ -8,6 +8,8 @@ each leg until down is down and the mean of the legs' lengths is what it was.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from fivebar_sim import kinematics
@@ -81,7 +83,7 @@ def settled(
         seed: Of the noise.
     """
     robot = Robot.load("q8bot")
-    options = {"gyro_noise": NOISE, "down_noise": NOISE, "span": 1.0}
+    options: dict[str, Any] = {"gyro_noise": NOISE, "down_noise": NOISE, "span": 1.0}
     env = WalkEnv(robot, None, slope=slope, duration=seconds, **options)
     level = Level(robot, env.task.period)
     standing = kinematics.hanging(robot.leg)[::2]
