@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+import operator
+from collections.abc import Iterable, Iterator
 from functools import reduce
 from typing import Any
 
@@ -40,6 +41,14 @@ def largest_of_rows(values: Array) -> Array:
 def largest_of_columns(values: Array) -> Array:
     """Return what max(axis=0) does for long columns, (N, k) to (k,), as `largest_of_rows` does."""
     return np.array([column.max() for column in values.T])
+
+
+def total(values: Iterable[Any]) -> Any:
+    """Return the sum of one or more numbers or arrays, one added to the other, with the same bits.
+
+    Python's own sum makes up for the rounding of floats, from 3.12 on, and not for that of arrays.
+    """
+    return reduce(operator.add, values)
 
 
 def sum_of_columns(values: NDArray[Any]) -> Array:

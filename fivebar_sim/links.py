@@ -7,6 +7,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from fivebar_sim.arrays import total
+
 Scalar = Any
 """A float, or an array with one value for each of many links."""
 
@@ -63,11 +65,13 @@ def moved(body: Link, at: tuple[Scalar, Scalar], angle: Scalar = 0.0) -> Link:
 
 def combined(*bodies: Link) -> Link:
     """Return several bodies in one frame as one body, by the parallel axis theorem."""
-    mass = sum(b.mass for b in bodies)
+    mass = total(b.mass for b in bodies)
     # Without mass there is no centre of mass: any of the bodies is the answer.
     if np.ndim(mass) == 0 and mass == 0.0:
         return bodies[0]
-    x = sum(b.mass * b.com[0] for b in bodies) / mass
-    y = sum(b.mass * b.com[1] for b in bodies) / mass
-    inertia = sum(b.inertia + b.mass * ((b.com[0] - x) ** 2 + (b.com[1] - y) ** 2) for b in bodies)
+    x = total(b.mass * b.com[0] for b in bodies) / mass
+    y = total(b.mass * b.com[1] for b in bodies) / mass
+    inertia = total(
+        b.inertia + b.mass * ((b.com[0] - x) ** 2 + (b.com[1] - y) ** 2) for b in bodies
+    )
     return Link(mass, (x, y), inertia)

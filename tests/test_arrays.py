@@ -5,7 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fivebar_sim.arrays import Array, broadcast, largest_of_columns, largest_of_rows, sum_of_columns
+from fivebar_sim.arrays import (
+    Array,
+    broadcast,
+    largest_of_columns,
+    largest_of_rows,
+    sum_of_columns,
+    total,
+)
 from fivebar_sim.errors import ArgumentError
 
 
@@ -30,6 +37,12 @@ def test_nan_is_the_largest_of_all() -> None:
     assert np.isnan(largest_of_rows(values)).tolist() == [k == 4 for k in range(9)]
     assert np.isnan(largest_of_columns(values)).tolist() == [False, True]
     assert np.isnan(sum_of_columns(values)).tolist() == [False, True]
+
+
+def test_total_has_the_bits_of_arrays_of_one_number() -> None:
+    """From Python 3.12 on sum() of these floats is 2, of arrays 0."""
+    numbers = (1.0, 1e100, 1.0, -1e100)
+    assert total(iter(numbers)) == total(np.array([each]) for each in numbers)[0] == 0.0
 
 
 @pytest.mark.parametrize("rows", [1, 20, 1000])

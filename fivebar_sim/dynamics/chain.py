@@ -27,7 +27,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from fivebar_sim import kinematics
-from fivebar_sim.arrays import Array
+from fivebar_sim.arrays import Array, total
 from fivebar_sim.checks import check_number
 from fivebar_sim.dynamics.plane import Four, Scalar, Vector, cross, dot, placed
 from fivebar_sim.errors import ArgumentError
@@ -346,7 +346,7 @@ class Chain:
         w1, w2, w3, w4 = w
         H12, H43 = self._coupled_by(p, r[1], r[2])
         turning = self.I1 * w1 * w1 + self.I2 * w2 * w2 + self.I3 * w3 * w3 + self.I4 * w4 * w4
-        lift = sum(dot(moment, self.leg.gravity) for moment in (self.hung, *r))
+        lift = total(dot(moment, self.leg.gravity) for moment in (self.hung, *r))
         return 0.5 * turning + H12 * w1 * w2 + H43 * w4 * w3, -lift
 
 
