@@ -14,6 +14,7 @@ import io
 import os
 import re
 import shutil
+import signal
 import subprocess
 import sys
 import tempfile
@@ -22,6 +23,7 @@ import zipfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import NoReturn
 
 from packaging.requirements import Requirement
 
@@ -192,8 +194,15 @@ def starts(python: str) -> bool:
     return done.returncode == 0
 
 
+def end(number: int, _: object) -> NoReturn:
+    """End as Ctrl-C does: the copies that are being set up go with their folders."""
+    raise SystemExit(128 + number)
+
+
 def main() -> int:
     """Check all pairs; print a line each; return the exit status."""
+    for number in (signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, end)
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("python", nargs="*", help="default: this one; with --long all on the PATH")
     parser.add_argument("--long", action="store_true", help="install, with every pip and Python")
