@@ -47,7 +47,7 @@ def total(motion: dynamics.Motion) -> Array:
 # law
 
 
-@pytest.mark.parametrize("seconds", [1.0, pytest.param(10.0, marks=pytest.mark.long)])
+@pytest.mark.parametrize("seconds", [0.4, pytest.param(10.0, marks=pytest.mark.long)])
 def test_springs_keep_the_energy_for_seconds(seconds: float) -> None:
     times = np.linspace(0.0, seconds, 1001)
     motion = dynamics.integrate(LEG, START, STILL, times, springs)
@@ -156,7 +156,7 @@ def test_results_are_the_callers_own() -> None:
 def test_motion_into_a_singular_pose_says_when() -> None:
     apart = (40.0, -40.0)  # free, the knees fly until B, C and D are in line
     with pytest.raises(DivergedError, match=r"down at t = 0\.0\d+ s: no step is short") as fine:
-        dynamics.integrate(LEG, START, apart, (0.0, 5.0))
+        dynamics.integrate(LEG, START, apart, (0.0, 5.0), rtol=1e-9, atol=1e-10)
     with pytest.raises(DivergedError, match=r"down at t = 0\.0\d+ s: .* at index \(1,\)") as fixed:
         dynamics.simulate(LEG, [SLACK, START], [STILL, apart], 2e-4, 25_000)
     assert fixed.value.time == pytest.approx(fine.value.time, abs=4e-4)  # two steps

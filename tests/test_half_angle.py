@@ -51,7 +51,7 @@ def bound(leg: FiveBar, foot: Array, theta: Array) -> Array:
 # law
 
 
-@pytest.mark.parametrize("legs", [60, pytest.param(1000, marks=pytest.mark.long)])
+@pytest.mark.parametrize("legs", [30, pytest.param(1000, marks=pytest.mark.long)])
 def test_two_routes_agree_over_random_legs(legs: int) -> None:
     """1000 points each, all four modes; of a million points 1.2 10^6 poses are reachable."""
     rng = np.random.default_rng(5)
@@ -83,23 +83,21 @@ def test_two_routes_agree_near_full_stretch_and_fold() -> None:
     rng = np.random.default_rng(6)
     worst = 0.0
     far_off = 0
-    for _ in range(500):
-        near, far, L5 = rng.uniform(0.02, 0.1, 3)
-        u = EPS * (near + far + L5) ** 2
-        inward = np.concatenate([[0.0], 10.0 ** rng.uniform(-17.0, -2.0, 50)])
-        for d in ((near + far) * (1.0 - inward), abs(near - far) * (1.0 + inward)):
-            for turn in (rng.uniform(-np.pi, np.pi, inward.size), np.full(inward.size, np.pi)):
-                r = d[:, None] * unit(turn)
-                for s in (-1, 1):
-                    (theta, ok), (alpha, also) = (
-                        f(r, near, far, s) for f in (side_angle, half_angle)
-                    )
-                    np.testing.assert_array_equal(ok, also)
-                    error = np.abs(wrap(alpha - theta))
-                    limit = side_bound(r, near, far, u)
-                    assert (error[ok] <= limit[ok]).all()
-                    worst = max(worst, float(error[ok].max()))
-                    far_off += int((error[ok] > 1e-10).sum())
+    chains: Any = rng.uniform(0.02, 0.1, (3, 500, 1))
+    near, far, L5 = chains
+    u = EPS * (near + far + L5) ** 2
+    inward = np.concatenate([np.zeros((500, 1)), 10.0 ** rng.uniform(-17.0, -2.0, (500, 50))], 1)
+    for d in ((near + far) * (1.0 - inward), abs(near - far) * (1.0 + inward)):
+        for turn in (rng.uniform(-np.pi, np.pi, d.shape), np.full(d.shape, np.pi)):
+            r = d[..., None] * unit(turn)
+            limit = side_bound(r, near, far, u)
+            for s in (-1, 1):
+                (theta, ok), (alpha, also) = (f(r, near, far, s) for f in (side_angle, half_angle))
+                np.testing.assert_array_equal(ok, also)
+                error = np.abs(wrap(alpha - theta))
+                assert (error[ok] <= limit[ok]).all()
+                worst = max(worst, float(error[ok].max()))
+                far_off += int((error[ok] > 1e-10).sum())
     assert worst < 1e-6
     assert far_off > 100  # so it is the bound that was tested
 
@@ -107,7 +105,7 @@ def test_two_routes_agree_near_full_stretch_and_fold() -> None:
 # oracle
 
 
-@pytest.mark.parametrize("batch", [*BATCHES, (300,)])
+@pytest.mark.parametrize("batch", [*BATCHES, (100,)])
 def test_batch_is_a_plain_loop_to_the_last_bit(batch: tuple[int, ...]) -> None:
     foot, theta = sample(RIGID, batch)
     found = kinematics.inverse_half_angle(RIGID, foot)
