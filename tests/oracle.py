@@ -72,9 +72,15 @@ class Leg:
     motors: tuple[complex, complex] = field(init=False, repr=False, compare=False)
     """A and E [m], half of L5 to either side of the origin."""
 
+    turning: tuple[float, ...] = field(init=False, repr=False, compare=False)
+    """m |c|^2 + I of each link about the joint it hangs from [kg m^2]."""
+
     def __post_init__(self) -> None:
         half = cmath.rect(0.5 * self.lengths[4], self.tilt)
+        links = zip(self.inertia, self.mass, self.com, strict=True)
+        turning = tuple(i + m * (c.real * c.real + c.imag * c.imag) for i, m, c in links)
         object.__setattr__(self, "motors", (-half, half))
+        object.__setattr__(self, "turning", turning)
 
 
 def crossing(centre: complex, radius: float, other: complex, reach: float, side: int) -> complex:
@@ -195,10 +201,7 @@ def mass_matrix(leg: Leg, psi: Floats) -> list[list[float]]:
     L1, _, _, L4, _ = leg.lengths
     _, m2, m3, _ = leg.mass
     _, c2, c3, _ = leg.com
-    own = [
-        i + m * (c.real * c.real + c.imag * c.imag)
-        for i, m, c in zip(leg.inertia, leg.mass, leg.com, strict=True)
-    ]
+    own = leg.turning
     left = m2 * L1 * (c2 * cmath.rect(1.0, psi[1] - psi[0])).real
     right = m3 * L4 * (c3 * cmath.rect(1.0, psi[2] - psi[3])).real
     return [
@@ -211,10 +214,14 @@ def mass_matrix(leg: Leg, psi: Floats) -> list[list[float]]:
 
 def bias(leg: Leg, psi: Floats, psi_dot: Floats, foot_force: complex = 0j) -> list[float]:
     """Return h = sum m J^T (J_dot psi_dot - g) - J_F^T F [N m] of the open tree, four numbers."""
-    e1, e2, e3, e4 = (cmath.rect(1.0, angle) for angle in psi)
-    w1, w2, w3, w4 = (rate * rate for rate in psi_dot)
+    e1, e2, e3, e4 = [cmath.rect(1.0, angle) for angle in psi]
+    w1, w2, w3, w4 = [rate * rate for rate in psi_dot]
     m1, m2, m3, m4 = leg.mass
-    c1, c2, c3, c4 = (c * e for c, e in zip(leg.com, (e1, e2, e3, e4), strict=True))
+    c1, c2, c3, c4 = leg.com
+    c1 *= e1
+    c2 *= e2
+    c3 *= e3
+    c4 *= e4
     B = leg.lengths[0] * e1
     D = leg.lengths[3] * e4
     g = leg.gravity
@@ -275,8 +282,15 @@ def forward_dynamics(
     """
     arms = loop(leg, psi)[1]
     G_x, G_z = jacobian(arms)
-    K = [[*m, -x, -z] for m, x, z in zip(mass_matrix(leg, psi), G_x, G_z, strict=True)]
-    K += [[*G_x, 0.0, 0.0], [*G_z, 0.0, 0.0]]
+    one, two, three, four = mass_matrix(leg, psi)
+    K = [
+        [*one, -G_x[0], -G_z[0]],
+        [*two, -G_x[1], -G_z[1]],
+        [*three, -G_x[2], -G_z[2]],
+        [*four, -G_x[3], -G_z[3]],
+        [*G_x, 0.0, 0.0],
+        [*G_z, 0.0, 0.0],
+    ]
     h1, h2, h3, h4 = bias(leg, psi, psi_dot, foot_force)
     drift = centripetal(arms, psi_dot)
     right = [tau[0] - h1, -h2, -h3, tau[1] - h4, -drift.real, -drift.imag]

@@ -21,8 +21,8 @@ import numpy as np
 import oracle
 import oracle_simulation
 from oracle import Array, Leg
-from oracle_simulation import Law, Path
-from oracle_trunk import carried, integrated, solved
+from oracle_simulation import Law, Pair, Path, integrated
+from oracle_trunk import carried, solved
 
 SETTLED = 1e-4
 """How fast the spring of a sliding foot takes up the force [s]."""
@@ -94,16 +94,22 @@ def touch(floor: Floor, depth: float, sinking: float, stretch: float, v: float) 
 
 
 def accelerations(
-    leg: Leg, floor: Floor, psi: Sequence[float], psi_dot: Sequence[float], tau: Array, force: Touch
-) -> Array:
-    """Return psi_ddot [rad/s^2] and hip_ddot_z [m/s^2], (5,), under a force of the floor.
+    leg: Leg,
+    floor: Floor,
+    psi: Sequence[float],
+    psi_dot: Sequence[float],
+    tau: Sequence[float],
+    force: Touch,
+) -> list[float]:
+    """Return psi_ddot [rad/s^2] and hip_ddot_z [m/s^2], five, under a force of the floor.
 
     On the right of `oracle_trunk` stand J_z^T N + (J_x + r e_2)^T T, and N for the trunk.
     """
-    own = carried(leg, floor.trunk, floor.radius, psi, psi_dot, tau.tolist())
-    right = own.right + own.up * force.N + own.along * force.T
-    loop, gap = own.loop
-    return solved(own.inertia, loop, right, -gap)[0]
+    own = carried(leg, floor.trunk, floor.radius, psi, psi_dot, tau)
+    touched = zip(own.right, own.up, own.along, strict=True)
+    right = [r + z * force.N + x * force.T for r, z, x in touched]
+    loop, still = own.loop
+    return solved(own.inertia, loop, right, still)[0]
 
 
 def simulate(
@@ -126,7 +132,7 @@ def simulate(
     height = floor.radius + drop - oracle.position(oracle.foot(leg, first)).imag
     anchor = oracle.position(oracle.foot(leg, first)).real + floor.radius * first[1]
 
-    def state(t: float, row: Array) -> tuple[list[float], list[float], Array, Touch, float]:
+    def state(t: float, row: Array) -> tuple[list[float], list[float], Pair, Touch, float]:
         y = row.tolist()
         psi = oracle.closed(leg, y[0], y[1])
         psi_dot = oracle_simulation.knee_rates(leg, psi, y[2], y[3])
@@ -135,19 +141,19 @@ def simulate(
         F_dot = oracle.velocity(tip[1], psi_dot)
         v = F_dot.real + floor.radius * psi_dot[1]
         contact = touch(floor, floor.radius - y[4] - F.imag, -y[5] - F_dot.imag, y[6], v)
-        tau = np.array(law(leg, path, t, y[:2], y[2:4]))
+        tau = law(leg, path, t, y[:2], y[2:4])
         return psi, psi_dot, tau, contact, F.real + floor.radius * psi[1] - anchor
 
     def slope(t: float, row: Array) -> list[float]:
         psi, psi_dot, tau, contact, _ = state(t, row)
-        ddot = accelerations(leg, floor, psi, psi_dot, tau, contact).tolist()
+        ddot = accelerations(leg, floor, psi, psi_dot, tau, contact)
         return [row[2], row[3], ddot[0], ddot[3], row[5], ddot[4], contact.rate]
 
     y0 = [first[0], first[3], 0.0, 0.0, height, 0.0, 0.0]
-    time, states = integrated(slope, y0, times, rtol=1e-7, atol=1e-10)
-    rows = [state(t, row) for t, row in zip(time.tolist(), states, strict=True)]
+    states = integrated(slope, y0, times, rtol=1e-7, atol=1e-10)
+    rows = [state(t, row) for t, row in zip(times.tolist(), states, strict=True)]
     return Stance(
-        time=time,
+        time=times,
         tau=np.array([row[2] for row in rows]),
         ground=np.array([[row[3].T, row[3].N] for row in rows]),
         slip=np.array([row[4] for row in rows]),

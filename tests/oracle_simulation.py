@@ -7,6 +7,7 @@ the loop cannot drift. Accelerations come from the multipliers' equations of `or
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
@@ -19,6 +20,8 @@ from oracle import Array, Leg
 Pair = Sequence[float]
 Path = Callable[[float], tuple[Pair, Pair, Pair]]
 """t [s] -> foot position [m], velocity [m/s], acceleration [m/s^2], in the hip frame."""
+Slope = Callable[[float, Array], list[float]]
+"""t [s], state y -> dy/dt."""
 Law = Callable[[Leg, Path, float, Pair, Pair], Pair]
 """(leg, path, t, theta, theta_dot) -> (tau_A, tau_E) [N m]."""
 
@@ -201,8 +204,6 @@ def simulate(
             motion opens the loop.
         RuntimeError: The integrator gave up, or crawls (as where B, C and D are in line).
     """
-    from scipy.integrate import solve_ivp
-
     start = oracle.pose(leg, complex(*path(0.0)[0]))
     if oracle.assembly_of(leg, start) != leg.assembly:
         raise ValueError(f"path(0) is in assembly {-leg.assembly}, the leg in {leg.assembly}")
@@ -211,10 +212,58 @@ def simulate(
     y0 = [start[0], start[3], 0.0, 0.0]
     enough = iter(range(round(100_000 * (1.0 + t_end))))  # DOP853 takes 65,000 a second
     chain = _Chain(leg, law, path, foot_force, springs, enough)
-    result = solve_ivp(chain.slope, (0.0, t_end), y0, method, times, rtol=rtol, atol=atol)
+    ask = integrated if method == "LSODA" else _by_one_step
+    return _recorded(chain, times, ask(chain.slope, y0, times, rtol, atol))
+
+
+def integrated(
+    slope: Slope, start: Sequence[float], times: Array, rtol: float, atol: float
+) -> Array:
+    """Return the states of a motion from t = 0, shape (N, n), by LSODA.
+
+    `odeint` takes its steps, and interpolates between them, outside of Python: solve_ivp's LSODA,
+    which is the same, spends as long on each step as a leg's slope takes.
+
+    Args:
+        slope: t [s], y -> dy/dt.
+        start: y at t = 0, n numbers.
+        times: Where the motion is wanted [s], growing from 0 or later.
+        rtol: Relative error of a step.
+        atol: Absolute error of a step.
+
+    Raises:
+        RuntimeError: The integrator gave up.
+    """
+    from scipy.integrate import ODEintWarning, odeint
+
+    at = times if times[0] == 0.0 else np.concatenate([[0.0], times])
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", ODEintWarning)
+        try:
+            states = odeint(
+                *(slope, start, at),
+                tfirst=True,
+                rtol=rtol,
+                atol=atol,
+                tcrit=at[-1:],
+                mxstep=1_000_000,
+            )
+        except ODEintWarning as error:
+            raise RuntimeError(str(error)) from None
+    return states[-len(times) :]
+
+
+def _by_one_step(
+    slope: Slope, start: Sequence[float], times: Array, rtol: float, atol: float
+) -> Array:
+    """Return what `integrated` does, by DOP853."""
+    from scipy.integrate import solve_ivp
+
+    span = (0.0, float(times[-1]))
+    result = solve_ivp(slope, span, start, "DOP853", times, rtol=rtol, atol=atol)
     if not result.success:
         raise RuntimeError(result.message)
-    return _recorded(chain, result.t, result.y.T)
+    return result.y.T
 
 
 def _recorded(chain: _Chain, time: Array, states: Array) -> Motion:

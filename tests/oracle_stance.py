@@ -15,8 +15,8 @@ import numpy as np
 import oracle
 import oracle_simulation
 from oracle import Array, Leg
-from oracle_simulation import Law, Path
-from oracle_trunk import carried, integrated, solved
+from oracle_simulation import Law, Path, integrated
+from oracle_trunk import carried, solved
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,16 +77,16 @@ def forward_dynamics(
         tau: Motor torques (tau_A, tau_E) [N m].
     """
     own = carried(leg, ground.trunk, ground.radius, psi, psi_dot, tau)
-    loop, gap = own.loop
+    loop, kept = own.loop
     held = [*loop, own.up]
-    still = [*-gap, -own.drift.imag]
+    still = [*kept, -own.drift.imag]
     if ground.grips:
         held = [*held, own.along]
         still = [*still, -own.drift.real]
 
-    ddot, force = solved(own.inertia, np.array(held), own.right, np.array(still))
-    T = float(force[3]) if ground.grips else 0.0
-    return ddot[:4].tolist(), float(ddot[4]), complex(T, float(force[2]))
+    ddot, force = solved(own.inertia, held, own.right, still)
+    T = force[3] if ground.grips else 0.0
+    return ddot[:4], ddot[4], complex(T, force[2])
 
 
 def simulate(
@@ -127,12 +127,12 @@ def simulate(
         return [y[2], y[3], psi_ddot[0], psi_ddot[3]]
 
     y0 = [first[0], first[3], 0.0, 0.0]
-    at, states = integrated(slope, y0, times, rtol, atol)
+    states = integrated(slope, y0, times, rtol, atol)
     rows = []
-    for t, y in zip(at.tolist(), states.tolist(), strict=True):
+    for t, y in zip(times.tolist(), states.tolist(), strict=True):
         tau = law(leg, path, t, y[:2], y[2:])
         rows.append([*tau, *_row(leg, ground, *_state(leg, y), tau)])
-    return _recorded(at, states[:, :2].copy(), np.array(rows), first, leg, ground)
+    return _recorded(times, states[:, :2].copy(), np.array(rows), first, leg, ground)
 
 
 def _state(leg: Leg, y: Sequence[float]) -> tuple[list[float], list[float]]:

@@ -12,31 +12,32 @@ The foot is a ball of radius r about F, fixed to L2: it touches below F, at J_x 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple
 
-import numpy as np
 import oracle
-from oracle import Array, Leg
+from oracle import Leg
+
+Rows = list[list[float]]
 
 
 class Carried(NamedTuple):
     """The equations of leg and trunk without a floor, for (psi_ddot, hip_ddot).
 
     Attributes:
-        inertia: [kg m^2, kg m, kg], shape (5, 5).
-        right: Right side [N m, N], shape (5,).
-        loop: G, with a column for hip_ddot, and G_dot psi_dot, shapes (2, 5) and (2,).
-        along: J_x + r e_2 of what touches [m], shape (5,).
-        up: J_z of it, 1 for hip_ddot [m], shape (5,).
+        inertia: [kg m^2, kg m, kg], five rows of five.
+        right: Right side [N m, N], five.
+        loop: G, with a column for hip_ddot, two rows of five; and -G_dot psi_dot, two.
+        along: J_x + r e_2 of what touches [m], five.
+        up: J_z of it, 1 for hip_ddot [m], five.
         drift: (J_dot psi_dot) of F, x + 1j z [m/s^2].
     """
 
-    inertia: Array
-    right: Array
-    loop: tuple[Array, Array]
-    along: Array
-    up: Array
+    inertia: Rows
+    right: list[float]
+    loop: tuple[Rows, list[float]]
+    along: list[float]
+    up: list[float]
     drift: complex
 
 
@@ -58,7 +59,7 @@ def carried(
         psi_dot: Their rates [rad/s].
         tau: Motor torques (tau_A, tau_E) [N m].
     """
-    # Plain numbers until the end: an operation on arrays of five takes as long as ten of them.
+    # Plain numbers: an operation on arrays of five takes as long as ten of them.
     S = [0.0] * 4
     mass = trunk + sum(leg.mass)
     pull = 0.0
@@ -76,52 +77,28 @@ def carried(
     J_x, J_z = oracle.jacobian(tip)
     J_x[1] += radius
     return Carried(
-        inertia=np.array([*inertia, [*S, mass]]),
-        right=np.array([tau[0] - h1, -h2, -h3, tau[1] - h4, mass * leg.gravity.imag - pull]),
-        loop=(
-            np.array([[*row, 0.0] for row in oracle.jacobian(arms)]),
-            np.array([gap.real, gap.imag]),
-        ),
-        along=np.array([*J_x, 0.0]),
-        up=np.array([*J_z, 1.0]),
+        inertia=[*inertia, [*S, mass]],
+        right=[tau[0] - h1, -h2, -h3, tau[1] - h4, mass * leg.gravity.imag - pull],
+        loop=([[*row, 0.0] for row in oracle.jacobian(arms)], [-gap.real, -gap.imag]),
+        along=[*J_x, 0.0],
+        up=[*J_z, 1.0],
         drift=oracle.centripetal(tip, psi_dot),
     )
 
 
-def solved(inertia: Array, held: Array, right: Array, still: Array) -> tuple[Array, Array]:
+def solved(
+    inertia: Rows, held: Rows, right: Sequence[float], still: Sequence[float]
+) -> tuple[list[float], list[float]]:
     """Return accelerations and the forces that hold: inertia a - held^T f = right, held a = still.
 
     Args:
-        inertia: Shape (5, 5).
-        held: Rows of what is held, shape (k, 5).
-        right: Shape (5,).
-        still: Accelerations of what is held, shape (k,).
+        inertia: Five rows of five.
+        held: Rows of what is held, k rows of five.
+        right: Five.
+        still: Accelerations of what is held, k.
     """
-    n = 5 + len(held)
-    K = np.zeros((n, n))
-    K[:5, :5] = inertia
-    K[5:, :5] = held
-    K[:5, 5:] = -held.T
-    found = np.array(oracle.solve(K, np.concatenate([right, still])))
+    columns = zip(*held, strict=True)
+    K = [[*row, *(-h for h in each)] for row, each in zip(inertia, columns, strict=True)]
+    K += [[*row, *(0.0 for _ in held)] for row in held]
+    found = oracle.solve(K, [*right, *still])
     return found[:5], found[5:]
-
-
-def integrated(
-    slope: Callable[[float, Array], list[float]],
-    start: Sequence[float],
-    times: Array,
-    rtol: float,
-    atol: float,
-) -> tuple[Array, Array]:
-    """Return times and states of a motion, shapes (N,) and (N, n), under error control.
-
-    Raises:
-        RuntimeError: The integrator gave up.
-    """
-    from scipy.integrate import solve_ivp
-
-    span = (0.0, float(times[-1]))
-    result = solve_ivp(slope, span, start, "LSODA", times, rtol=rtol, atol=atol)
-    if not result.success:
-        raise RuntimeError(result.message)
-    return result.t, result.y.T
