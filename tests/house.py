@@ -82,24 +82,37 @@ def when(parents: Iterable[ast.AST]) -> str:
     return kind
 
 
+BLOCKS = {"body", "handlers", "cases", "orelse", "finalbody"}
+"""Fields of nodes in which statements stand; expressions hold none."""
+
+
 def blocks(node: ast.AST) -> Iterator[ast.AST]:
     """Yield what stands directly within a node: expressions, which hold no statement, left out."""
-    for name in ("body", "handlers", "cases", "orelse", "finalbody"):
-        yield from getattr(node, name, ())
+    for name in BLOCKS.intersection(node._fields):
+        yield from getattr(node, name)
 
 
-def within(node: ast.AST) -> Iterator[ast.stmt]:
-    """Yield every statement within a node."""
-    for each in blocks(node):
-        if isinstance(each, ast.stmt):
-            yield each
-        yield from within(each)
+def within(node: ast.AST) -> list[ast.stmt]:
+    """Return every statement within a node, in no order."""
+    todo = [node]
+    found: list[ast.AST] = []
+    while todo:
+        inner = list(blocks(todo.pop()))
+        todo += inner
+        found += inner
+    return [each for each in found if isinstance(each, ast.stmt)]
 
 
 @functools.cache
 def parsed(source: str) -> ast.Module:
     """Return a source's tree, once for all that is asked of it."""
     return ast.parse(source)
+
+
+@functools.cache
+def written(source: str) -> list[ast.stmt]:
+    """Return every statement of a source, once for all that is asked of them."""
+    return within(parsed(source))
 
 
 def statements(node: ast.AST, parents: tuple[ast.AST, ...] = ()) -> Iterator[tuple[ast.AST, str]]:
@@ -215,7 +228,7 @@ def long_functions(source: str) -> list[str]:
     """Return "name: statements" of the functions that are too long."""
     return [
         f"{node.name}: {length(node)}"
-        for node in within(parsed(source))
+        for node in written(source)
         if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef)
         # Ruff lets no two statements share a line, so fewer lines need no counting.
         and (node.end_lineno or node.lineno) - node.lineno >= MOST_IN_A_FUNCTION
@@ -227,7 +240,7 @@ def dense_functions(source: str) -> list[str]:
     """Return the functions whose body has 12 lines or more, none of them blank or a comment."""
     lines = source.splitlines()
     found = []
-    for node in within(parsed(source)):
+    for node in written(source):
         if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
             body = node.body[1:] if ast.get_docstring(node) else node.body
             text = lines[body[0].lineno - 1 : body[-1].end_lineno] if body else []
@@ -240,7 +253,7 @@ def dense_functions(source: str) -> list[str]:
 def double_assignments(source: str) -> list[int]:
     """Return the lines of `a, b = x, y`; a swap, with the left's names on the right, is none."""
     found = []
-    for node in within(parsed(source)):
+    for node in written(source):
         if isinstance(node, ast.Assign) and isinstance(node.value, ast.Tuple):
             target = node.targets[0]
             unpacks = any(isinstance(each, ast.Starred) for each in node.value.elts)

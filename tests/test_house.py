@@ -80,6 +80,7 @@ def trees() -> Iterator[None]:
     gc.disable()
     yield
     gc.enable()
+    house.written.cache_clear()
     house.parsed.cache_clear()
     imports.cache_clear()
 
@@ -92,7 +93,7 @@ def name(path: Path) -> str:
 def imports(source: str) -> list[str]:
     """Return the top-level names of all modules that a source imports, anywhere in it."""
     found = []
-    for node in house.within(house.parsed(source)):
+    for node in house.written(source):
         if isinstance(node, ast.Import):
             found += [alias.name.split(".")[0] for alias in node.names]
         elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
