@@ -117,6 +117,8 @@ import numpy, pyarrow
 from fivebar_sim.cli import arrow
 arrow.leave_pandas_out()
 assert pyarrow.array(numpy.ones(2)).to_pylist() == [1.0, 1.0]
+assert pyarrow.array([1, None]).to_pylist() == [1, None]
+assert pyarrow.scalar("one").as_py() == "one"
 assert "pandas" not in sys.modules
 try:
     pyarrow.table({"a": [1]}).to_pandas()

@@ -23,7 +23,11 @@ class _NoPandas:
 
 
 def leave_pandas_out() -> None:
-    """Have pyarrow look for pandas now, and find none; what needs it later imports it then."""
+    """Have pyarrow look for pandas now, and find none; what needs it later imports it then.
+
+    It looks twice: once in Python, with the first array that it is given, and once in C++, with the
+    first list or number, as Rerun gives it one.
+    """
     if "pandas" in sys.modules:
         return
     import numpy as np
@@ -32,7 +36,7 @@ def leave_pandas_out() -> None:
     finder = _NoPandas()
     sys.meta_path.insert(0, finder)
     try:
-        # It looks once, with the first array that it is given.
         pyarrow.array(np.empty(0))
+        pyarrow.array([0])
     finally:
         sys.meta_path.remove(finder)
