@@ -91,10 +91,11 @@ def test_a_closed_stdout_or_stderr_changes_no_status(
         assert ended.value.code == status
 
 
-def test_help_is_quick() -> None:
+def test_start_and_end_are_quick() -> None:
     code = """
-import sys
+import atexit, gc, sys
 from fivebar_sim.cli import main
+atexit.register(lambda: print("frozen:", gc.get_freeze_count() > 0))
 slow = {"rerun", "dm_control", "matplotlib", "mujoco", "scipy", "pyarrow"}
 main(["--help"])
 print("slow:", sorted({"tyro", "rich", *slow} & set(sys.modules)))
@@ -104,9 +105,12 @@ for args in (["--version"], ["-h"], ["run", "--help"]):
     except SystemExit as end:
         assert not end.code
     print("slow:", sorted(slow & set(sys.modules)))
+print("frozen:", gc.get_freeze_count() > 0)
 """
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert [line for line in done.stdout.splitlines() if "slow:" in line] == 4 * ["slow: []"]
+    said = [line for line in done.stdout.splitlines() if line.startswith(("slow:", "frozen:"))]
+    # What was imported is left alone at the end of the process, and only there.
+    assert said == [*4 * ["slow: []"], "frozen: False", "frozen: True"]
 
 
 def test_tables_do_without_pandas_unless_something_needs_it(tmp_path: Path) -> None:

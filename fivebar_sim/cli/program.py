@@ -5,6 +5,7 @@ Exit status: 0 fine, 1 failed, 2 bad input; `terminal` has all of them.
 
 from __future__ import annotations
 
+import atexit
 import functools
 import gc
 import importlib
@@ -119,6 +120,9 @@ def _seldom_collected() -> Iterator[None]:
         yield
     finally:
         gc.set_threshold(*before)
+        # At the end of the process too, which has no need of the memory any more.
+        atexit.unregister(gc.freeze)
+        atexit.register(gc.freeze)
 
 
 def user_environment() -> dict[str, str]:
