@@ -5,11 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fivebar_sim import rollout
+from fivebar_sim import dynamics, rollout
 from fivebar_sim.metrics import lasting
 from fivebar_sim.metrics.guards import Guard
 from fivebar_sim.rollout import Result
 from fivebar_sim.scenario import Scenario
+from fivebar_sim.simulation import jolts
 
 EDGE = ("path.outside=nearest", "path.centre=[0,-0.093]")
 TWELVE_BITS = "servo.resolution=0.0015339807878856412"
@@ -47,6 +48,20 @@ def test_resolved_decay_stands_out_by_what_is_lost_in_a_step() -> None:
     decay = np.where(np.arange(60) < 20, 0.0, r ** (np.arange(60.0) - 20.0))
     found = lasting.lone(np.stack([decay, decay], axis=1), np.zeros(2))
     assert found.max() == pytest.approx(1.0 - r)
+
+
+# oracle
+
+
+def test_torques_needed_in_some_steps_are_those_of_the_whole_motion() -> None:
+    planned = rollout.plan(Scenario.load("payload-ellipse", [SHORT, "path.ramp=0.0"]))
+    motion = planned.motion
+    leg = planned.scenario.leg
+    whole = dynamics.step_torques(
+        leg, motion.q, motion.timestep, motion.force[:-1], payload=motion.payload
+    )
+    steps = np.array([0, 1, 2, 300, len(whole) - 1])
+    np.testing.assert_array_equal(jolts._needed(planned, steps), whole[steps])
 
 
 # runs that are none

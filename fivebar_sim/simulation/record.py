@@ -7,13 +7,12 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
-from fivebar_sim import dynamics, kinematics
-from fivebar_sim.arrays import Array, Bools, blocks, largest_of_rows
+from fivebar_sim import kinematics
+from fivebar_sim.arrays import Array, Bools
 from fivebar_sim.control.servo import Drive, MotorStep, applied_torque
 from fivebar_sim.control.servo import saturated as clipped
 from fivebar_sim.dynamics import gears
 from fivebar_sim.kinematics.stops import Ranges
-from fivebar_sim.metrics import lasting
 from fivebar_sim.metrics.columns import (
     BELT_COLUMN,
     COLUMNS,
@@ -31,9 +30,6 @@ from fivebar_sim.scenario.scenes import Ground, Treadmill
 from fivebar_sim.simulation import sampling
 from fivebar_sim.simulation.plan import Plan
 from fivebar_sim.simulation.steps import States
-
-FAINTEST = 1e-9
-"""Largest torque of a run in which nothing moves or weighs anything [N m]: it is all rounding."""
 
 
 class Part(NamedTuple):
@@ -116,7 +112,8 @@ def _joints(states: States) -> tuple[Array, Array, Array]:
     return states.qpos[0, :, -4:], states.qvel[0, :, -4:], states.ctrl[0, :, -2:]
 
 
-def _drive(planned: Plan) -> Drive:
+def drive(planned: Plan) -> Drive:
+    """Return what the commands of a plan are."""
     # A controller that plans has no `drive`: its setpoints are angles.
     return getattr(planned.scenario.controller, "drive", "position")
 
@@ -136,7 +133,7 @@ def _steps(planned: Plan, part: Part) -> MotorStep:
         q=before[:, MOTOR_JOINTS],
         q_next=q[:, MOTOR_JOINTS],
         v_next=v[:, MOTOR_JOINTS],
-        drive=_drive(planned),
+        drive=drive(planned),
     )
 
 
@@ -149,103 +146,6 @@ def growth(planned: Plan, record: Record) -> Array | None:
         stands = record["ground_z"] > 0.0
     found = sampling.stability(planned.scenario, planned.motion, angles, rates, stands)
     return None if found is None else found.hidden(record["time"])
-
-
-def jolts(planned: Plan, record: Record) -> Array | None:
-    """Return the torque that lasts a single step, as a part of the run's largest, (N,).
-
-    So does torque that should, but that the run does not show: what a bus makes of a jump by
-    chance, missing it or holding it for many steps, and what dies out within the step. In torque
-    drive a torque lasts for a period: there only corners of the reference count, else it is None.
-    """
-    torque = motors(record, "torque")
-    found = np.zeros_like(torque)
-    if _drive(planned) == "position":
-        found = lasting.lone(torque, np.zeros(2))
-
-    # The targets' own rates are those of a formula; those of projected ones are differences.
-    if planned.asked is None and planned.scenario.path.outside == "nearest":
-        found = np.maximum(found, _referred(planned))
-    elif _drive(planned) == "torque":
-        return None
-
-    sent = planned.setpoints
-    asked = planned.asked
-    if sent is not None and asked is not None and sent is not asked:
-        found = np.maximum(found, _fed(planned, asked))
-        found = np.maximum(found, _missed(planned, sent, torque))
-    largest = max(float(np.abs(torque).max()), FAINTEST)
-    return largest_of_rows(found) / largest
-
-
-def _referred(planned: Plan) -> Array:
-    """Return the torque for a single step that a feedback takes from its reference, (N, 2).
-
-    A corner of projected targets has such an acceleration; not every controller uses it.
-    """
-    wanted = planned.motion
-    theta, rate, acceleration = (
-        q[1:, MOTOR_JOINTS] for q in (wanted.q, wanted.q_dot, wanted.q_ddot)
-    )
-    leg = planned.scenario.leg
-    force = wanted.force[1:]
-    needed = np.empty_like(theta)
-    for rows in blocks(len(needed)):
-        needed[rows] = dynamics.inverse(
-            leg,
-            theta[rows],
-            rate[rows],
-            acceleration[rows],
-            force[rows],
-            payload=wanted.payload,
-        )
-
-    found = lasting.lone(needed, np.zeros(2))
-    worst = int(np.argmax(largest_of_rows(found)))
-    used = sampling.accelerated(planned.scenario, wanted, worst + 1)
-    return found if (2.0 * used > found[worst]).any() else np.zeros_like(found)
-
-
-def _fed(planned: Plan, asked: Array) -> Array:
-    """Return the torque for a single step that setpoints feed forward [N m], (N, 2)."""
-    scenario = planned.scenario
-    wanted = planned.motion
-    needed = np.empty_like(asked)
-    for rows in blocks(len(needed)):
-        # One step more, which is thrown away: a step's acceleration is known from the one before.
-        first = max(rows.start - 1, 0)
-        found = dynamics.step_torques(
-            scenario.leg,
-            wanted.q[first : rows.stop + 1],
-            wanted.timestep,
-            wanted.force[first : rows.stop],
-            payload=wanted.payload,
-        )
-        needed[rows] = found[rows.start - first :]
-
-    # In both: the motion needs it, and a setpoint asks for it. One alone may turn round as fast.
-    start = wanted.q[0, MOTOR_JOINTS]
-    told = scenario.servo.kp * lasting.lone(asked, start)
-    return np.minimum(told, lasting.lone(needed, np.zeros(2)))
-
-
-def _missed(planned: Plan, sent: Array, torque: Array) -> Array:
-    """Return by how much jumps of the setpoints ask for more than the run shows [N m], (N, 2).
-
-    Before the motor moves, a jump by d asks for kp d more than there was.
-    """
-    servo = planned.scenario.servo
-    start = planned.motion.q[:1, MOTOR_JOINTS]
-    jump = servo.kp * np.diff(sent, axis=0, prepend=start)
-    if planned.scenario.command == 1:
-        # Sent in every step, the rest of it is the motion, which a motor sees coming.
-        jump = np.clip(jump, -servo.kp * servo.resolution, servo.kp * servo.resolution)
-
-    before = np.concatenate([np.zeros((1, 2)), torque[:-1]])
-    asked = np.abs(before + jump)
-    if servo.limit is not None:
-        asked = np.minimum(asked, servo.limit)
-    return np.where(jump != 0.0, np.maximum(asked - np.abs(torque).max(), 0.0), 0.0)
 
 
 def lowest(built: mujoco.MjModel) -> float:

@@ -12,7 +12,7 @@ from fivebar_sim.errors import DivergedError
 from fivebar_sim.metrics import branch, energy, ground
 from fivebar_sim.metrics.columns import Record
 from fivebar_sim.metrics.tracking import left_path
-from fivebar_sim.simulation import record
+from fivebar_sim.simulation import jolts, record
 from fivebar_sim.simulation.measure import Unrecorded
 from fivebar_sim.simulation.plan import Plan
 from fivebar_sim.simulation.steps import States, fault
@@ -105,7 +105,7 @@ class Recorder:
             ranges=record.ranges(planned.model),
             trunk=record.lowest(planned.model),
             growth=record.growth(planned, record_so_far),
-            jolts=record.jolts(planned, record_so_far),
+            jolts=jolts.jolts(planned, record_so_far),
             signs=self._signs,
             heights=self._heights,
         )

@@ -18,6 +18,7 @@ from fivebar_sim.metrics.energy import Balance
 from fivebar_sim.metrics.guards import Evidence, Found, Guard
 from fivebar_sim.robots import places
 from fivebar_sim.robots.measure import lowest
+from fivebar_sim.simulation import jolts
 from fivebar_sim.simulation import record as recorded
 from fivebar_sim.walking.walk import Walk
 
@@ -105,7 +106,7 @@ def _evidence(went: Walk, k: int, leg: Seen, balance: Balance) -> Evidence:
         trunk=0.0,
         heating=leg.heated,
         growth=recorded.growth(planned.legs[k], _grounded(went, leg)),
-        jolts=recorded.jolts(planned.legs[k], leg.record),
+        jolts=jolts.jolts(planned.legs[k], leg.record),
     )
 
 
