@@ -43,22 +43,29 @@ def lean(models: Sequence[mujoco.MjModel], *, forces: bool = True) -> list[mujoc
     alone = len({id(model) for model in models}) == 1
     copies: dict[bytes, mujoco.MjModel] = {}
     names: dict[int, bytes] = {}
+    name = b""
+    last = b""
     for model in models:
         if id(model) in names:
             continue
         # Many models would not stay in the processor's cache: equal ones are one.
-        name = b"" if alone else _digest(model)
+        if not alone:
+            whole = _saved(model)
+            # Most are like the one before them: to compare two takes a hundredth of a digest.
+            if whole != last:
+                name = hashlib.blake2b(whole, digest_size=16).digest()
+                last = whole
         names[id(model)] = name
         if name not in copies:
             copies[name] = _short(model, forces=forces)
     return [copies[names[id(model)]] for model in models]
 
 
-def _digest(model: mujoco.MjModel) -> bytes:
-    """Return what equal models have in common, and no others."""
+def _saved(model: mujoco.MjModel) -> bytes:
+    """Return all bytes of a model, which equal models have in common."""
     whole = np.empty(mujoco.mj_sizeModel(model), dtype=np.uint8)
     mujoco.mj_saveModel(model, None, whole)
-    return hashlib.blake2b(whole.data, digest_size=16).digest()
+    return whole.tobytes()
 
 
 def _short(model: mujoco.MjModel, *, forces: bool) -> mujoco.MjModel:
