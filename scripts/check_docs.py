@@ -59,6 +59,8 @@ COPIED = (
 )
 CODE = re.compile(r"`[^`]+`")
 DECIMAL = re.compile(r"\d\.\d")
+CELL = re.compile(r"\{(\d)\}")
+RULE = re.compile(r"^\|[-| ]+\|$", re.M)
 
 SHELL = set("$|&;<>()`*?~")
 """What only a shell understands: a line without these is a list of words."""
@@ -222,7 +224,7 @@ class Page:
         labels = [re.sub(r" \[.*\]$", "", label) for label in head]  # the heads without units
         wrong: list[str] = []
         for row in rows:
-            command = re.sub(r"\{(\d)\}", lambda n, row=row: row[int(n[1]) - 1], item.said)
+            command = CELL.sub(lambda n, row=row: row[int(n[1]) - 1], item.said)
             came = self.command(command.replace("`", ""))
             try:
                 compare_row(labels, row, came)
@@ -253,14 +255,14 @@ class Page:
         """Compare an item with what the command of its comment prints."""
         self.compared += 1
         command, _, values = item.said.partition(" => ")
-        if item.kind == "table" and "{" in command:
+        if item.kind == "table" and CELL.search(command):
             self.rows(item)
         elif values:
             compare_values(values, item.text, self.succeeded(command))
-        elif item.kind == "text":
-            compare_lines(item.text, self.succeeded(command))
+        elif item.kind in ("text", "table"):
+            compare_lines(RULE.sub("", item.text), self.succeeded(command))
         else:
-            raise WrongError("has a comment that says neither values nor what to run for each row")
+            raise WrongError("has a comment that says no values")
 
     def check(self, item: Item) -> None:
         """Raise unless an item is true."""

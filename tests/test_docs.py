@@ -52,6 +52,12 @@ y = 2.5
 | --- | --- | --- |
 | 1.25 | 1.25 | a remark |
 
+<!-- printed by: echo limits={} && printf '| a | b |\\n| 1.254 | x |\\n' -->
+
+| a | b |
+| --- | --- |
+| 1.25 | x |
+
 ```python
 print(y)
 ```
@@ -181,7 +187,9 @@ def test_a_page_that_is_so(wrong: Any) -> None:
             "<!-- printed by: printf 'rms\\t\\t1.5' {1} -->\n\n| s | rms |\n| - | - |\n| x | 1.7 |",
             "rms 1.7, printed is 1.5",
         ),
-        ("<!-- printed by: echo 1.5 -->\n\n| a |\n| - |\n| 1.5 |", "neither values nor"),
+        ("<!-- printed by: echo '| 1.5 |' -->\n\n| a |\n| - |\n| 1.5 |", "shows\n    | a |"),
+        ("<!-- printed by: printf '| a |\\n| 1.5 |' -->\n\n| a |\n| - |\n| 1.7 |", "| 1.5 |"),
+        ("<!-- printed by: echo 1.5 -->\n\nIt is 1.5.", "says no values"),
     ],
 )
 def test_a_page_that_is_not_so(wrong: Any, page: str, said: str) -> None:
