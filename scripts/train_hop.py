@@ -1,4 +1,4 @@
-"""./.venv/bin/python scripts/train_hop.py [--generations 40] [--seed 0]: learns to hop in a minute.
+"""./.venv/bin/python scripts/train_hop.py [--generations 40] [--seed 0]: learns to hop in minutes.
 
 64 legs of the vector environment try a policy each, and CMA-ES makes the next 64 of what came of
 them. With --ray HOST:PORT they do so on a Ray cluster, with the same numbers. Prints the
@@ -41,7 +41,7 @@ EXCESS = 1.0  # what a square radian beyond the bounds costs, per control step
 # [s], episodes
 TRAINED = 2.0
 SHOWN = 4.0
-PATH = "hop path, no limit"
+PATH = "hop path"
 FINE = 0.001  # [s], control period of what is measured
 RAIL = Scenario.load("rail-hop", ["scene.drop=0"])  # an episode begins on the floor
 SERVO = msgspec.structs.replace(RAIL.servo, limit=1.0)  # [N m]
@@ -83,8 +83,11 @@ class Cma:
         """Return the points of a generation, (population, N)."""
         values, self._B = np.linalg.eigh(self._C)
         self._D = np.sqrt(values)
+        # The symmetric root: an eigenvector's sign, and at first all of it, is LAPACK's to choose,
+        # and would make of one seed other points on another processor.
+        root = (self._B * self._D) @ self._B.T
         shape = (self._population, len(self.mean))
-        self._y = (self._random.standard_normal(shape) * self._D) @ self._B.T
+        self._y = self._random.standard_normal(shape) @ root
         return self.mean + self.sigma * self._y
 
     def tell(self, fitness: Array) -> None:
@@ -304,8 +307,7 @@ def show(weights: Array) -> dict[str, Played]:
     return {
         "trained": play(legs, held(trained), seeds),
         "random setpoints": play(legs, held(lambda *_: random.uniform(low, high, shape)), seeds),
-        "hop path": on_path(SERVO),
-        PATH: on_path(RAIL.servo),
+        PATH: on_path(SERVO),
     }
 
 
@@ -342,7 +344,7 @@ def draw(found: list[Generation], shown: dict[str, Played], out: Path) -> None:
 
     for name, colour in (("trained", "#1f77b4"), (PATH, "#e67e22")):
         hip = 1e3 * shown[name].hip_z[rows, 0]
-        right.plot((rows + 1) * FINE, hip, color=colour, label=name.split(",")[0])
+        right.plot((rows + 1) * FINE, hip, color=colour, label=name)
 
     right.set(title="height of the hip [mm]", xlabel="time [s]")
     right.legend(fontsize=8, loc="lower right")
