@@ -96,7 +96,7 @@ def test_all_is_as_in_gymnasium(kind: str, action: str) -> None:
     """Episodes of random actions, one seed: the same bits in observation, reward and end."""
     options: dict[str, Any] = {
         "action": action,
-        "duration": 0.1,
+        "duration": 0.05,
         "servo": Servo(limit=1.0, delay=0.003),
         "randomise": Randomise(length=(0.97, 1.03), kp=(0.8, 1.2), delay=(0.0, 0.01)),
         "model_seed": 4,
@@ -106,7 +106,7 @@ def test_all_is_as_in_gymnasium(kind: str, action: str) -> None:
     step = env.reset()
     observation, _ = other.reset(seed=5)
     random = np.random.default_rng(1)
-    for _ in range(25):
+    for _ in range(14):
         chosen = random.uniform(other.episodes.low, other.episodes.high)
         over = step.last()
         step = env.step(chosen)

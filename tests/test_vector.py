@@ -40,7 +40,7 @@ def test_each_leg_has_the_bits_of_it_alone(kind: str, randomise: Randomise | Non
     options: dict[str, Any] = {
         "randomise": randomise,
         "action": "motion" if randomise else "position",
-        "duration": 0.08,
+        "duration": 0.05,
         "span": 2.0,
         "sensors": Sensors(noise=0.01, delay=0.002),
     }
@@ -51,7 +51,7 @@ def test_each_leg_has_the_bits_of_it_alone(kind: str, randomise: Randomise | Non
     random = np.random.default_rng(0)
     over = [False] * LEGS
     ends = 0
-    for _ in range(45):
+    for _ in range(34):
         chosen = random.uniform(legs.episodes.low, legs.episodes.high, legs.action_space.shape)
         seen, reward, terminated, truncated, info = legs.step(chosen)
         for i, env in enumerate(alone):
