@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from copy import copy
 from dataclasses import replace
 from typing import Any
 
@@ -36,7 +37,7 @@ def in_the_model(plan: Plan, names: Iterable[str] = MODEL) -> dict[str, Plan]:
     """Return plans of which the model is not what the controller thinks it is."""
     plans = {}
     for name in names:
-        compiled = rollout.plan(plan.scenario).model
+        compiled = copy(plan.model)
         MODEL[name](compiled)
         plans[name] = plan._replace(model=compiled)
     return plans

@@ -22,7 +22,7 @@ import pytest
 from faults import MODEL, Fault
 from faults_program import PROGRAM
 from shell import Shell
-from shipped import NAMES, shortened
+from shipped import NAMES, in_short, shortened
 
 from fivebar_sim import rollout
 from fivebar_sim.arrays import Array
@@ -60,7 +60,7 @@ def brief(name: str) -> Scenario:
 def without_fault(name: str) -> baseline.Baseline:
     """Return the baseline of a brief run, with the shipped one's tolerances."""
     shipped = baseline.read(baseline.place(name))
-    right = rollout.run(brief(name))
+    right = in_short(name)._replace(limits=[])  # they are for all of it
     recorded = baseline.record(right.metrics, shipped)
     assert shipped is not None
     assert comparison.compare(right, recorded).failures == []

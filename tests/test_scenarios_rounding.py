@@ -74,7 +74,7 @@ def test_same_guard_trips_of_a_solver_that_is_hurried() -> None:
 
 @pytest.mark.parametrize("name", NAMES)
 def test_same_verdict_of_what_is_shipped_in_short(name: str) -> None:
-    first = in_short()[name]
+    first = in_short(name)
     assert unmoved(first, nudged(rollout.plan(first.scenario), 1))
 
 
