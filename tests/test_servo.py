@@ -146,8 +146,7 @@ def test_free_motor_reaches_its_speed(name: str, integrator: Integrator, drive: 
     data = mujoco.MjData(mj := lone_motors(servo, integrator, drive, 1e-4))
     push = servo.limit if drive == "torque" else 1e4 * servo.limit / servo.kp
     data.ctrl[:] = push, -push
-    for _ in range(2000):
-        mujoco.mj_step(mj, data)
+    mujoco.mj_step(mj, data, 2000)
     expected = (servo.limit - servo.dry) / servo.back_emf  # speed, less what friction takes
     np.testing.assert_allclose(data.qvel, [expected, -expected], rtol=1e-2)
 
