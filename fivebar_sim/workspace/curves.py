@@ -91,8 +91,8 @@ def nearest_on(curves: Curves, bar: FourBar, p: Complex) -> tuple[Rows, Complex,
     bar = bar._replace(rocker=curves.rocker[segment])
 
     def slope(s: Array) -> Array:
-        here = bar.between(q, dq, s)
-        return _along(at - bar.joints(here)[2], bar.velocity(here, dq))
+        F, velocity = bar.foot(bar.between(q, dq, s), dq)
+        return _along(at - F, velocity)
 
     s = crossing(slope, from_start[turns], from_end[turns])
     return owner, bar.joints(bar.between(q, dq, s))[2], curves.F[pose]
@@ -110,11 +110,18 @@ def _near_segments(curves: Curves, p: Complex) -> tuple[Rows, Rows, Rows]:
     pose = d.argmin(axis=1)
     least = d[np.arange(len(p)), pose][:, None]
     # Half of the arc, from the chord; see `nearest_on`.
-    half = 0.51 * np.abs(curves.F[curves.first + 1] - curves.F[curves.first])
-    reach = np.minimum(d[:, curves.first], d[:, curves.first + 1]) - half
+    first = curves.first
+    half = 0.51 * np.abs(curves.F[first + 1] - curves.F[first])
     # A segment that is equally near to rounding stays in.
-    owner, segment = np.nonzero(reach <= least * (1.0 + 1e-12))
-    return pose, owner, segment
+    most = least * (1.0 + 1e-12)
+
+    # No end of a segment that may is farther: most are left out before their own half is asked.
+    near = d <= (most + half.max(initial=0.0)) * (1.0 + 1e-12)
+    owner, segment = np.nonzero(near[:, first] | near[:, first + 1])
+    ends = first[segment]
+    reach = np.minimum(d[owner, ends], d[owner, ends + 1]) - half[segment]
+    may = reach <= most[owner, 0]
+    return pose, owner[may], segment[may]
 
 
 def _along(v: Complex, direction: Complex) -> Array:

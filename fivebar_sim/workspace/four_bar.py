@@ -57,13 +57,12 @@ class FourBar(NamedTuple):
 
     def gradient(self, q: Array) -> tuple[Array, Array]:
         """Return G [m^2], (...), and dG/dq, (..., 2)."""
-        gap, slope_0, slope_1 = self._gap(q[..., 0], q[..., 1])
+        B, C, _ = self.joints(q)
+        gap, slope_0, slope_1 = self._gap(B, C)
         return gap, np.stack([slope_0, slope_1], axis=-1)
 
-    def _gap(self, q_0: Array, q_1: Array) -> tuple[Array, Array, Array]:
+    def _gap(self, B: Complex, C: Complex) -> tuple[Array, Array, Array]:
         """Return G and its derivatives by each of the two angles."""
-        B = self.crank * turn(q_0)
-        C = B + self.coupler * turn(q_0 + q_1)
         r = C - self.base
         size = np.abs(r)
         # Factored: the difference of squares would lose the digits that Newton needs.
@@ -79,7 +78,8 @@ class FourBar(NamedTuple):
 
         # Newton squares the relative gap, at first 1e-3: three steps reach rounding.
         for _ in range(3):
-            gap, slope_0, slope_1 = self._gap(q_0, q_1)
+            B = self.crank * turn(q_0)
+            gap, slope_0, slope_1 = self._gap(B, B + self.coupler * turn(q_0 + q_1))
             square = slope_0**2 + slope_1**2
             # A pose that is on the curve to rounding stays: a step there would only add noise.
             off = (np.abs(gap) > rounding) & (square > 0.0)
@@ -91,16 +91,20 @@ class FourBar(NamedTuple):
 
     def velocity(self, q: Array, dq: Array) -> Complex:
         """Return dF per radian along the curve, in the direction of the chord dq [m], (...)."""
-        _, slope = self.gradient(q)
-        tangent = np.stack([-slope[..., 1], slope[..., 0]], axis=-1)
+        return self.foot(q, dq)[1]
+
+    def foot(self, q: Array, dq: Array) -> tuple[Complex, Complex]:
+        """Return F and its `velocity` in the direction of the chord dq [m], each (...)."""
+        B, C, F = self.joints(q)
+        _, slope_0, slope_1 = self._gap(B, C)
+        tangent = np.stack([-slope_1, slope_0], axis=-1)
         # At a double point dG/dq is 0 and has no direction: the chord stands in for it.
-        steep = _norm2(slope) > (EXACT * self.scale**2) ** 2
+        steep = _norm2(tangent) > (EXACT * self.scale**2) ** 2
         tangent = np.where(steep[..., None], tangent, dq)
         length = np.sqrt(_norm2(tangent))
         sense = np.where((tangent * dq).sum(axis=-1) < 0.0, -1.0, 1.0)
         t = tangent * (sense / np.where(length > 0.0, length, 1.0))[..., None]
-        B, _, F = self.joints(q)
-        return 1j * (F * t[..., 0] + (F - B) * t[..., 1])
+        return F, 1j * (F * t[..., 0] + (F - B) * t[..., 1])
 
     def other_elbow(self, q: Array) -> Complex:
         """Return where C is if the foot stays and crank and coupler bend the other way, (...).
