@@ -25,7 +25,7 @@ from fivebar_sim.geometry import FiveBar
 from fivebar_sim.kinematics.stops import Ranges, beyond
 from fivebar_sim.metrics import ground
 from fivebar_sim.metrics.branch import Branch
-from fivebar_sim.metrics.columns import JOINT_COLUMNS, side_by_side
+from fivebar_sim.metrics.columns import JOINT_COLUMNS
 from fivebar_sim.metrics.energy import Balance
 from fivebar_sim.metrics.json_types import LARGEST, Amount, Number, Table
 from fivebar_sim.metrics.lasting import chattering, clipped
@@ -259,7 +259,8 @@ def _unsolved(run: Evidence) -> Found:
 
 def _leaned(run: Evidence) -> Found:
     # Nobody planned the force of a stop: the motion is not the one that was asked for.
-    q = side_by_side(run.record, JOINT_COLUMNS)
+    # Each joint in one piece of memory: it is looked at by itself.
+    q = np.stack([run.record[name] for name in JOINT_COLUMNS]).T
     found = beyond(q, run.ranges)
     return first_of(run, {f"joint {joint}": found[joint] for joint in found}, run.bounds.stops)
 

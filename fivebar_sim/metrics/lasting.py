@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fivebar_sim.arrays import Array, Bools, largest_of_rows
 from fivebar_sim.metrics.columns import motors
@@ -46,18 +47,38 @@ def chattering(record: Mapping[str, Array], command: int) -> Array:
     """
     torque = motors(record, "torque")
     window = _window(record["time"])
-    # An RMS, as a single spike must not make all else look faint.
-    steps = np.minimum(np.arange(1, len(torque) + 1), window)
-    squares = _sums(torque**2, window)
-    mean = (squares[:, 0] + squares[:, 1]) / 2.0 / steps
-    loud = FAINT * np.sqrt(np.maximum(mean, 0.0))
-    # Whole commands apart: within a command a torque may ring without any chatter.
     d = np.zeros_like(torque)
+    # Whole commands apart: within a command a torque may ring without any chatter.
     d[command:] = torque[command:] - torque[:-command]
-    d = np.where(np.abs(d) <= loud[:, None], 0.0, d)
+    after, motor = np.nonzero(d[command:] * d[:-command] < 0.0)
+    if not len(after):
+        return np.zeros(len(torque))
+
+    # Few steps turn round, and how loud it is there is all that matters.
+    so_far = _so_far(torque**2)
+    now = after + command
+    loud = np.ones(len(now), dtype=bool)
+    for rows in (after, now):
+        loud &= np.abs(d[rows, motor]) > _faint(so_far, rows, window)
     chatters = np.zeros(torque.shape, dtype=bool)
-    chatters[command:] = d[command:] * d[:-command] < 0.0
+    chatters[now[loud], motor[loud]] = True
+    if not loud.any():
+        return np.zeros(len(torque))
     return largest_of_rows(_sums(chatters, window)) / window
+
+
+def _faint(so_far: Array, rows: NDArray[np.intp], window: int) -> Array:
+    """Return `FAINT` of both motors' RMS in the last second, of some steps.
+
+    Args:
+        so_far: The running sums of tau^2, see `_so_far`.
+        rows: The steps.
+        window: Steps of the last second.
+    """
+    # An RMS, as a single spike must not make all else look faint.
+    squares = so_far[rows + 1] - so_far[np.maximum(rows + 1 - window, 0)]
+    mean = (squares[:, 0] + squares[:, 1]) / 2.0 / np.minimum(rows + 1, window)
+    return FAINT * np.sqrt(np.maximum(mean, 0.0))
 
 
 def lone(values: Array, before: Array) -> Array:
@@ -92,6 +113,14 @@ def _window(time: Array) -> int:
 def _sums(values: Bools | Array, window: int) -> Array:
     """Return the sums over the steps of a window that ends with each step, (N, 2)."""
     # Differences of running sums: the cost does not depend on the window's width.
-    so_far: Array = np.concatenate([np.zeros((1, 2)), np.cumsum(values, axis=0, dtype=float)])
-    begin = np.maximum(np.arange(1, len(values) + 1) - window, 0)
-    return so_far[1:] - so_far[begin]
+    so_far = _so_far(values)
+    found = so_far[1:].copy()
+    found[window:] -= so_far[1:-window]
+    return found
+
+
+def _so_far(values: Bools | Array) -> Array:
+    """Return the sums of the first k rows, k = 0..N, (N + 1, 2)."""
+    so_far = np.zeros((len(values) + 1, 2))
+    np.cumsum(values, axis=0, dtype=float, out=so_far[1:])
+    return so_far
