@@ -73,6 +73,9 @@ class Mine(msgspec.Struct, frozen=True, kw_only=True):
                 raise LoopOpenError("the loop is open", (0,))
             case "error":
                 raise KeyError("gain")
+            case "scribbles":
+                seen.theta[:] = 7.0
+                seen.theta_dot[:] = 7.0
             case "legal":
                 raise ArgumentError("gain must be in (0, inf), got 0")
         return good
@@ -207,6 +210,15 @@ def test_commands_hold_for_a_control_period(every: int) -> None:
     k = np.arange(400)
     wanted = plan.motion.q[:, [0, 2]]
     np.testing.assert_array_equal(sent, wanted[k // every * every])
+
+
+@pytest.mark.parametrize("period", [0.001, 0.002])
+def test_what_a_controller_writes_over_its_observation_stays_there(period: float) -> None:
+    tidy, untidy = (
+        rollout.execute(with_mine(Mine(period=period, after=0.0, wrong=wrong), *BRIEF)).record
+        for wrong in ("none", "scribbles")
+    )
+    assert digest(untidy) == digest(tidy)
 
 
 @pytest.mark.parametrize("integrator", ["discrete", "implicitfast"])

@@ -72,13 +72,13 @@ class Bus:
 
         Args:
             k: The step.
-            command: (A, E) [rad or N m], (nsim, 2).
+            command: (A, E) [rad or N m], (nsim, 2). What is returned may be a view of it.
         """
         latest = k if isinstance(k, int) else int(k.max())
         n = min(self._every, self._steps - latest)
         if self._prompt:
-            # A copy too, in a fifth of the time that `repeat` takes.
-            held = command[:, None].copy() if n == 1 else np.repeat(command[:, None], n, axis=1)
+            # As it is, in a tenth of the time that `repeat` takes.
+            held = command[:, None] if n == 1 else np.repeat(command[:, None], n, axis=1)
             return self._round(held)
 
         if isinstance(k, int):

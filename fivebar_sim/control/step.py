@@ -83,7 +83,8 @@ class ControlStep:
         servos = [servo] * nsim if isinstance(servo, Servo) else list(servo)
         check_alike(servos)
         self.every = every
-        self._back_emf = servos[0].back_emf
+        # A torque goes through a driver that makes up for it; see `send`.
+        self._back_emf = servos[0].back_emf if drive == "torque" else 0.0
         self._sensors = sensors
         self._drive = drive
         self._h = timestep
@@ -96,6 +97,7 @@ class ControlStep:
         self._theta_dot = np.zeros_like(self._theta)
         noisy = sensors.noise > 0.0 or sensors.rate_noise > 0.0
         self._noise = Noise(nsim) if noisy else None
+        self._is_exact = not noisy and sensors.resolution == 0.0 and self._part == 0.0
         self._bus = Bus(servos, drive, timestep=timestep, steps=steps, every=every)
         self.restart(np.arange(nsim), start, seeds)
 
@@ -127,8 +129,11 @@ class ControlStep:
             rows: Only the sensors of these legs are read; the others' noise goes on where it was.
                 None: those of all legs.
         """
-        sensors = self._sensors
         time = cast(float, k * self._h)
+        if self._is_exact:
+            return Observation(time, self._theta[:, 0], self._theta_dot[:, 0])
+
+        sensors = self._sensors
         theta = self._seen(self._theta)
         theta_dot = self._seen(self._theta_dot)
         if self._noise is not None:
@@ -157,7 +162,7 @@ class ControlStep:
             command: (A, E) [rad or N m], (nsim, 2).
         """
         sent = self._bus.send(k, command)
-        if self._drive == "position" or self._back_emf == 0.0:
+        if self._back_emf == 0.0:
             return sent
         # The driver sits on the motor and knows its present rate, without the sensors' delay.
         return sent + self._back_emf * self._theta_dot[:, -1:]

@@ -47,14 +47,15 @@ class Asked:
         every = period_steps(plans[0])
         self.rows = rows
         self.name = s.controller_name
-        self._controller = cast(Feedback, s.controller)
-        self._ask = self._controller.command
+        controller = cast(Feedback, s.controller)
+        self._is_angle = controller.drive == "position"
+        self._ask = controller.command
         self._leg = s.leg
         self._servo = s.servo
         self._step = ControlStep(
             s.servo,
             s.sensors,
-            self._controller.drive,
+            controller.drive,
             timestep=plans[0].motion.timestep,
             every=every,
             steps=s.steps,
@@ -83,8 +84,8 @@ class Asked:
         if latest is not None:
             self._step.moved(*latest)
         seen = self._step.observe(k)
-        question = (self._leg, self._servo, seen, next(self._wanted))
-        command = answer_of(self.name, self._ask, *question)
+        wanted = next(self._wanted)
+        command = answer_of(self.name, self._ask, self._leg, self._servo, seen, wanted)
         if not is_numbers(command, seen.theta.shape):
             raise ConfigError(
                 f"controller {self.name!r} must command numbers of shape {seen.theta.shape}, "
@@ -98,12 +99,12 @@ class Asked:
     def refusal(self) -> Refusal | None:
         """Return the first command since this was last called that is no command, if any is."""
         commands = np.array(self._commands, dtype=np.float64).reshape(-1, len(self.rows), 2)
-        seen = np.array(self._seen).reshape(commands.shape)
-        self._commands.clear()
-        self._seen.clear()
+        seen = self._seen
+        self._commands = []
+        self._seen = []
         good = np.isfinite(commands)
-        if self._controller.drive == "position":
-            good &= np.abs(commands - seen) <= FARTHEST
+        if self._is_angle:
+            good &= np.abs(commands - np.array(seen).reshape(commands.shape)) <= FARTHEST
         if good.all():
             return None
         k = int(np.argmin(good.all(axis=(1, 2))))

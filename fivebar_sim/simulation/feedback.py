@@ -128,6 +128,8 @@ class _Loop:
         self._ctrl = np.empty((len(plans), self._every, plans[0].model.nu))
         self._pushed = plans[0].pushes.size > 0
         self._asked = asked(plans)
+        # Whose commands are all that there are.
+        self._only = self._asked[0] if len(self._asked) == 1 and not self._pushed else None
         self._asking = 0
         self._k = 0
 
@@ -183,6 +185,10 @@ class _Loop:
     def _commands(self, latest: Latest | None) -> Array:
         """Return the commands of the next control period, (nsim, n, nu)."""
         k = self._k
+        if self._only is not None:
+            # A command may be of whole numbers, or of another size.
+            return np.asarray(self._only.sent(k, latest), dtype=np.float64)
+
         left = self._steps - k
         ctrl = self._ctrl if left >= self._every else self._ctrl[:, :left]
         if self._pushed:

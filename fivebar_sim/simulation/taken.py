@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, Protocol
 
 import numpy as np
@@ -19,7 +20,10 @@ class Taken(Protocol):
         ...
 
     def latest(self) -> tuple[Array, Array]:
-        """Return the motors' angles and rates after the steps of the last `take`, (nsim, n, 2)."""
+        """Return the motors' angles and rates after the steps of the last `take`, (nsim, n, 2).
+
+        They may change with the next step.
+        """
         ...
 
     def states(self) -> States:
@@ -46,20 +50,27 @@ class Singles:
             (np.empty((length, *now.shape), now.dtype), now) for now in (*live, legs.warned())
         ]
         kept = [each.swapaxes(0, 1) for each, _ in self._pairs]
-        seen = legs.states(kept[:-1], kept[0][..., -2:], legs.warned())
-        self._angles = seen.qpos[..., MOTORS_FROM_END]
-        self._rates = seen.qvel[..., MOTORS_FROM_END]
+        self._angles, self._rates = _motors(legs, kept[:-1])
+        # Of a single step they are what MuJoCo has now: nothing is cut out of all steps.
+        self._present = _motors(legs, [each[:, None] for each in live])
 
     def take(self, ctrl: Array) -> None:
         """Take the steps of a control period with finite commands, (nsim, n, nu)."""
+        count = self._count
         for k in range(ctrl.shape[1]):
             self._legs.once(ctrl[:, k])
             for kept, now in self._pairs:
-                kept[self._count] = now
-            self._count += 1
+                kept[count] = now
+            count += 1
+        self._count = count
 
     def latest(self) -> tuple[Array, Array]:
-        """Return the motors' angles and rates after the steps of the last `take`, (nsim, n, 2)."""
+        """Return the motors' angles and rates after the steps of the last `take`, (nsim, n, 2).
+
+        They may change with the next step.
+        """
+        if self._every == 1:
+            return self._present
         begin = (self._count - 1) // self._every * self._every
         return self._angles[:, begin : self._count], self._rates[:, begin : self._count]
 
@@ -70,6 +81,12 @@ class Singles:
         *arrays, warnings = (kept[:count].swapaxes(0, 1) for kept, _ in self._pairs)
         ctrl = arrays[0][..., -self._legs.nu :]
         return self._legs.states(arrays, ctrl, warnings[:, -1])
+
+
+def _motors(legs: Legs, arrays: Sequence[Array]) -> tuple[Array, Array]:
+    """Return the motors' angles and rates in what `Legs.live` lists, (nsim, n, 2)."""
+    states = legs.states(arrays, arrays[0][..., -2:], legs.warned())
+    return states.qpos[..., MOTORS_FROM_END], states.qvel[..., MOTORS_FROM_END]
 
 
 class Periods:
