@@ -84,14 +84,16 @@ class Pd(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     def command(self, leg: FiveBar, servo: Servo, seen: Observation, wanted: Reference) -> Array:
         """Return the motor torques [N m], (..., 2)."""
         del leg, servo  # each motor by itself, driven in torque
+        error = wanted.theta - seen.theta
+        if not self.seconds and self.kp_opening is None and self.kd_opening is None:
+            # As most are: asked in every step, a leg spends a tenth of its time here.
+            if self.derivative == "measurement":
+                return self.kp * error - self.kd * seen.theta_dot
+            return self.kp * error + self.kd * (wanted.theta_dot - seen.theta_dot)
+
         rate = -seen.theta_dot
         if self.derivative == "error":
             rate = wanted.theta_dot - seen.theta_dot
-        error = wanted.theta - seen.theta
-        if not self.seconds and self.kp_opening is None and self.kd_opening is None:
-            # As most are: asked in every step, a leg spends a tenth of its time below.
-            return self.kp * error + self.kd * rate
-
         part = int(part_of(self.seconds, seen.time)) if self.seconds else 0
         spring = _weighed(_in_part(self.kp, part), _in_part(self.kp_opening, part), error)
         return spring + _weighed(_in_part(self.kd, part), _in_part(self.kd_opening, part), rate)
