@@ -66,13 +66,13 @@ def mujoco(
         noslip: Iterations of the solver that takes all softness out of friction.
         hard: Whether the contact is that of `stance.harden`.
     """
-    plan = stance.planned(Key("classic", integrator, "velocity", timestep), grips=True)
+    key = Key("classic", integrator, "velocity", timestep)
+    plan = stance.planned(key, grips=True, duration=duration)
     if impratio is not None:
         plan.model.opt.impratio = impratio
     plan.model.opt.noslip_iterations = noslip
     record = air.sampled(rollout.execute(stance.harden(plan) if hard else plan), 0)
-    tau = air.pair(record, "torque_A", "torque_E")
-    return _load(tau[: round(duration / air.TIMESTEPS[0])])
+    return _load(air.pair(record, "torque_A", "torque_E"))
 
 
 def _load(tau: Array) -> Load:
