@@ -33,9 +33,9 @@ class Body(NamedTuple):
 
 
 class Motion(NamedTuple):
-    """Directions of the links [rad] and their rates [rad/s], (N, 4); height of the hip and rate."""
+    """Unit vectors along the links and their rates [rad/s], (N, 4); height of the hip and rate."""
 
-    psi: Array
+    along: Complex
     omega: Array
     hip: Array
     lift: Array
@@ -89,18 +89,18 @@ def bodies(scenario: dict[str, Any]) -> list[Body]:
 
 def place(body: Body, m: Motion) -> Complex:
     """Return the centre of a body [m], (N,)."""
-    return _sum(1j * m.hip, *(arm * np.exp(1j * m.psi[:, k]) for k, arm in body.arms))
+    return _sum(1j * m.hip, *(arm * m.along[:, k] for k, arm in body.arms))
 
 
 def speed(body: Body, m: Motion) -> Complex:
     """Return its velocity [m/s], (N,)."""
-    turned = (1j * m.omega[:, k] * arm * np.exp(1j * m.psi[:, k]) for k, arm in body.arms)
+    turned = (1j * m.omega[:, k] * arm * m.along[:, k] for k, arm in body.arms)
     return _sum(1j * m.lift, *turned)
 
 
 def pull(body: Body, m: Motion) -> Complex:
     """Return its acceleration at steady rates of the links [m/s^2], (N,)."""
-    pulled = (-(m.omega[:, k] ** 2) * arm * np.exp(1j * m.psi[:, k]) for k, arm in body.arms)
+    pulled = (-(m.omega[:, k] ** 2) * arm * m.along[:, k] for k, arm in body.arms)
     return _sum(0j * m.hip, *pulled)
 
 
@@ -183,7 +183,7 @@ def _motions(run: Run) -> tuple[Motion, Motion]:
         q = [of(f"theta_{joint}") for joint in "ABDE"]
         v = [of(f"theta_dot_{joint}") for joint in "ABDE"]
         hip = (of("hip_z"), of("hip_dot_z")) if "hip_z" in r else (still, still)
-        found.append(Motion(_directions(q), _directions(v), *hip))
+        found.append(Motion(np.exp(1j * _directions(q)), _directions(v), *hip))
     return found[0], found[1]
 
 
@@ -194,7 +194,8 @@ def _directions(q: list[Array]) -> Array:
 
 
 def _half_back(m: Motion, h: float) -> Motion:
-    return m._replace(psi=m.psi - 0.5 * h * m.omega, hip=m.hip - 0.5 * h * m.lift)
+    back = np.exp(-0.5j * h * m.omega)
+    return m._replace(along=m.along * back, hip=m.hip - 0.5 * h * m.lift)
 
 
 def _kinetic(all_bodies: list[Body], trunk: float, m: Motion) -> Array:
