@@ -6,13 +6,16 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from html.parser import HTMLParser
 from pathlib import Path
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import pytest
 
-from fivebar_sim.report import in_plane, over_time
+from fivebar_sim.report import in_plane, look, over_time
 from fivebar_sim.report.draw import Drawn
 from fivebar_sim.runs.stored import StoredRun
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 VOID = {"meta", "br", "link", "img", "input", "hr", "wbr"}
 
@@ -93,6 +96,26 @@ def unfitted() -> Iterator[None]:
         for engine in (ConstrainedLayoutEngine, Fitted):
             patch.setattr(engine, "execute", lambda engine, figure: None)
         yield
+
+
+@contextmanager
+def drawn_once() -> Iterator[dict[str, str]]:
+    """Turn the figures of a key into SVG once: other runs' have other numbers, no other elements.
+
+    Yields:
+        The SVG of each key so far; those that are taken out are drawn again.
+    """
+    svg = look.svg
+    drawn: dict[str, str] = {}
+
+    def once(figure: Figure, key: str, alt: str) -> str:
+        if key not in drawn:
+            drawn[key] = svg(figure, key, alt)
+        return drawn[key]
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(look, "svg", once)
+        yield drawn
 
 
 @contextmanager
