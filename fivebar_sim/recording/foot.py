@@ -88,16 +88,28 @@ def send_foot(
 
     A row of the trail is the line from the row before to this one.
     """
-    import rerun as rr
-
     # A needle across the leg plane, so that the target shows on both sides of the foot's ball.
     tip = np.array([0.0, 2.5 * leg.foot_radius, 0.0])
     target = in_space(moved.target)
     foot = in_space(moved.world_foot)
-    strips = {TARGET: np.stack([target - tip, target + tip], axis=1)}
-    steps = np.stack([np.concatenate([foot[:1], foot[:-1]]), foot], axis=1)
-    strips |= {band.entity: steps for band in TRAIL}
-    for entity, lines in strips.items():
-        # Rerun stores positions in single precision.
-        columns = rr.LineStrips3D.columns(strips=lines.astype(np.float32))
-        stream.send_columns(f"{look.root}{entity}", times, columns)
+    needle = _lines(target - tip, target + tip)
+    stream.send_columns(f"{look.root}{TARGET}", times, needle)
+    # Made once: all bands show the same steps, each at its own age.
+    trail = _lines(np.concatenate([foot[:1], foot[:-1]]), foot)
+    for band in TRAIL:
+        stream.send_columns(f"{look.root}{band.entity}", times, trail)
+
+
+def _lines(begin: Array, end: Array) -> list[rr.ComponentColumn]:
+    """Return a line in each row, from a point to another one, (n, 3) each."""
+    import pyarrow
+    import rerun as rr
+
+    # Rerun stores positions in single precision.
+    ends = np.stack([begin, end], axis=1).astype(np.float32)
+    kind = rr.components.LineStrip3DBatch(ends[:1]).as_arrow_array().type
+    inner = rr.components.Position3DBatch(ends.reshape(-1, 3)).as_arrow_array()
+    # Rerun itself would count the points of each line by themselves, in Python.
+    offsets = np.arange(0, len(inner) + 1, 2, dtype=np.int32)
+    strips = pyarrow.ListArray.from_arrays(offsets, inner, type=kind)
+    return list(rr.LineStrips3D.columns(strips=strips))

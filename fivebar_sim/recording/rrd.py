@@ -8,7 +8,7 @@ from __future__ import annotations
 import json
 import os
 import threading
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import asdict
 from pathlib import Path
@@ -207,10 +207,29 @@ def _send_run(
     foot.send_foot(stream, leg, moved, look, drawn)
     ground.send_ground(stream, leg, moved, look, drawn, room)
 
-    # One after the other: together they would take more memory than the record.
-    for plot in series(run.scenario, run.record):
+    send_plots(stream, series(run.scenario, run.record), look, time)
+
+
+def send_plots(
+    stream: rr.RecordingStream, plots: Iterable[Series], look: Look, time: Array
+) -> None:
+    """Send every row of plots, one after the other.
+
+    Together they would take more memory than the record.
+
+    Args:
+        stream: Where they are sent.
+        plots: The plots.
+        look: How the run looks.
+        time: Time of each row [s], (N,).
+    """
+    known: dict[int, list[rr.TimeColumn]] = {}
+    for plot in plots:
         for steps, part in parts(plot):
-            send_series(stream, part, look, times(time[steps - 1], steps))
+            begin = int(steps[0])
+            if begin not in known:
+                known[begin] = times(time[begin - 1 : steps[-1]], steps)
+            send_series(stream, part, look, known[begin])
 
 
 def parts(plot: Series) -> Iterator[tuple[Rows, Series]]:
@@ -236,6 +255,7 @@ def send_series(
     stream: rr.RecordingStream, plot: Series, look: Look, times: list[rr.TimeColumn]
 ) -> None:
     """Send all lines of a plot as one column; a row without values is empty, a gap in the line."""
+    import pyarrow
     import rerun as rr
 
     style = rr.SeriesLines(
@@ -243,6 +263,7 @@ def send_series(
         colors=[look.colour(colour) for colour in plot.lines.values()],
     )
     stream.log(f"{look.root}{plot.path}", style, static=True)
-    values = rr.Scalars.columns(scalars=plot.values.ravel())
-    columns = values.partition(len(plot.lines) * plot.shown)
-    stream.send_columns(f"{look.root}{plot.path}", times, columns)
+    values = rr.components.ScalarBatch(pyarrow.array(plot.values.ravel()))
+    counts = len(plot.lines) * plot.shown
+    column = rr.ComponentColumn(rr.Scalars.descriptor_scalars(), values, lengths=counts)
+    stream.send_columns(f"{look.root}{plot.path}", times, [column])

@@ -87,10 +87,7 @@ def send(stream: rr.RecordingStream, runs: Sequence[Run], names: list[str]) -> N
     rrd.log_room(stream, room._replace(floor=room.floor and not all(uneven)))
     for run, look, own in zip(runs, shown, plots, strict=True):
         _send_run(stream, run, look, room)
-        time = run.record["time"]
-        for plot in own:
-            for steps, part in rrd.parts(plot):
-                rrd.send_series(stream, part, look, rrd.times(time[steps - 1], steps))
+        rrd.send_plots(stream, own, look, run.record["time"])
 
 
 def _robot(run: Run) -> Robot:
