@@ -52,6 +52,7 @@ class Alone:
     ) -> None:
         self._model = model
         self._data = mujoco.MjData(model)
+        self._ctrl = self._data.ctrl
         self._batch = batch
         self._friction = friction
 
@@ -72,30 +73,20 @@ class Alone:
         if self._friction is not None:
             self._model.dof_frictionloss[:] = self._friction[0]
         rows = _Rows(self._model, self._data, record, steps)
-        servos = self._servos
         warned = self._warnings.tolist()
         k = 0
 
-        while k < steps:
+        while k < steps and self._warnings.tolist() == warned:
             length = min(self._right // 4, steps - k)
-            if servos is None:
-                self._data.ctrl[:] = ctrl[0, k]
-                mujoco.mj_step(self._model, self._data)
-                solved = True
-            elif self._right >= FAR and length > 1:
-                k += self._together(servos, ctrl[:, k : k + length], rows, k)
-                continue
+            if self._servos is not None and self._right >= FAR and length > 1:
+                k += self._together(self._servos, ctrl[:, k : k + length], rows, k)
             else:
-                solved = self._limited(servos, ctrl[0, k], rows, k)
+                k = self._singly(ctrl[0], rows, k)
 
-            rows.keep(k, solved=solved)
-            k += 1
-            if self._warnings.tolist() != warned:
-                rows.repeat(k)
-                self._batch.warning[0, :, 0] = self._data.warning.lastinfo
-                self._batch.warning[0, :, 1] += self._warnings - np.array(warned)
-                break
-
+        if self._warnings.tolist() != warned:
+            rows.repeat(k)
+            self._batch.warning[0, :, 0] = self._data.warning.lastinfo
+            self._batch.warning[0, :, 1] += self._warnings - np.array(warned)
         mujoco.mj_getState(self._model, self._data, state, WHOLE)
         return rows.arrays
 
@@ -121,39 +112,59 @@ class Alone:
             self._put_back(states[0, good])
         return good
 
-    def _limited(self, servos: Servos, ctrl: Array, rows: _Rows, k: int) -> bool:
-        """Take step k with commands (nu,), and again if a limit is not kept.
+    def _singly(self, ctrl: Array, rows: _Rows, k: int) -> int:
+        """Take steps from k on one by one, until more can be taken together or MuJoCo warns.
+
+        Args:
+            ctrl: Commands of every step, (N, nu).
+            rows: What is recorded.
+            k: The first.
 
         Returns:
-            Whether its torques were found.
+            The step after them.
         """
+        servos = self._servos
         warned = self._warnings.tolist()
-        self._data.ctrl[:] = ctrl
-        servos.begin(ctrl[servos.own].tolist())
-        mujoco.mj_step(self._model, self._data)
-        self._right += 1
-        if not servos.is_wrong():
-            return True
+        if servos is not None:
+            servos.begin()
 
-        self._right = 0
-        # Warnings of a step that is thrown away do not count.
-        self._warnings[:] = warned
-        return self._retake(servos, rows.before(k))
+        while k < len(ctrl):
+            self._ctrl[:] = ctrl[k]
+            mujoco.mj_step(self._model, self._data)
+            solved = True
+            if servos is not None:
+                if servos.is_right(ctrl[k, servos.own].tolist()):
+                    self._right += 1
+                else:
+                    self._right = 0
+                    solved = self._retake(servos, rows.before(k), warned)
+                servos.go_on()
+            rows.keep(k, solved=solved)
+            k += 1
+            if self._warnings.tolist() != warned or self._right >= FAR:
+                break
+        return k
 
-    def _retake(self, servos: Servos, before: Array) -> bool:
+    def _retake(self, servos: Servos, before: Array, warned: list[int]) -> bool:
         """Take a step again, that was just taken, until its modes agree with its end.
 
         Args:
             servos: The servos.
             before: The state before it.
+            warned: MuJoCo's warnings before it, (kinds,).
 
         Returns:
             Whether its torques were found.
         """
+        # Warnings of a step that is thrown away do not count.
+        reset = self._warnings.tolist() != warned
+        self._warnings[:] = warned
 
         def again() -> None:
+            # MuJoCo has what it found from the state before, unless a warning made it begin anew.
+            anew = reset or self._warnings.tolist() != warned
             self._put_back(before)
-            mujoco.mj_step(self._model, self._data)
+            (mujoco.mj_step if anew else mujoco.mj_step2)(self._model, self._data)
             servos.release()
 
         def ended(torque: Array) -> Array:

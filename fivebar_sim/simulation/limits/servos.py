@@ -5,8 +5,12 @@ Arrays of two to twelve numbers would take several times as long.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from operator import itemgetter
+
 import mujoco
 import numpy as np
+from numpy.typing import ArrayLike
 
 from fivebar_sim.arrays import Array, Bools
 from fivebar_sim.simulation.limits.clipping import SLACK, Clipping
@@ -34,35 +38,51 @@ class Servos:
         self._kp: list[float] = clipping.kp[0, 0].tolist()
         self._kd: list[float] = clipping.kd[0, 0].tolist()
         self._limit: list[float] = clipping.limit[0, 0].tolist()
+        least = [-limit for limit in self._limit]
+        self._laws = list(zip(self._kp, self._kd, least, self._limit, strict=True))
         self.own = slice(-clipping.motors, None)
         self.limit = clipping.limit[0, 0]
 
+        joints = clipping.joints
+        # Of a list, which is made faster as a whole than some of its numbers are found.
+        self._of = itemgetter(joints) if isinstance(joints, slice) else itemgetter(*joints.tolist())
         self._qpos = data.qpos
         self._qvel = data.qvel
         self._ctrl = data.ctrl
         self._forces = data.qfrc_applied
 
-    def begin(self, sent: list[float]) -> None:
-        """Remember the state before a step, and its commands (motors,)."""
-        self._u = sent
-        self._q: list[float] = self._qpos[self._joints].tolist()
-        self._v: list[float] = self._qvel[self._joints].tolist()
+    def begin(self) -> None:
+        """Remember the state before the next step."""
+        self._q = self._of(self._qpos.tolist())
+        self._v = self._of(self._qvel.tolist())
 
-    def is_wrong(self) -> bool:
-        """Return whether the step ends in other modes than MuJoCo chose at its start."""
-        motors = zip(
-            self._kp, self._kd, self._limit, self._u, self._q, self._v, *self._end(), strict=True
-        )
-        for kp, kd, limit, u, q, v, q_end, v_end in motors:
+    def is_right(self, sent: list[float]) -> bool:
+        """Return whether a step ended in the modes that MuJoCo chose at its start.
+
+        Args:
+            sent: Its commands, (motors,).
+        """
+        self._u = sent
+        self._end()
+        motors = zip(self._laws, sent, self._q, self._v, self._q_end, self._v_end, strict=True)
+        for (kp, kd, least, most), u, q, v, q_end, v_end in motors:
             begun = kp * (u - q) - kd * v
             ended = kp * (u - q_end) - kd * v_end
-            # Most are within; NaN is not, and neither beyond.
-            if -limit <= begun <= limit and -limit <= ended <= limit:
+            # Most are on one side; NaN is on none.
+            if least <= begun <= most:
+                if least <= ended <= most:
+                    continue
+            elif (begun > most and ended > most) or (begun < least and ended < least):
                 continue
-            mode = _side(begun, limit)
-            if _end_side(ended, mode, limit) != mode:
-                return True
-        return False
+            mode = _side(begun, most)
+            if _end_side(ended, mode, most) != mode:
+                return False
+        return True
+
+    def go_on(self) -> None:
+        """Begin the next step where the last one ended."""
+        self._q = self._of(self._qpos.tolist()) if not self._late else self._q_end
+        self._v = self._v_end
 
     def begun(self) -> Modes:
         """Return the modes that MuJoCo chose with the state before the step."""
@@ -71,21 +91,30 @@ class Servos:
 
     def ended(self, modes: Modes) -> Modes:
         """Return the modes that the state after the step in some modes calls for."""
-        return tuple(map(_end_side, self._asked(*self._end()), modes, self._limit))
+        self._end()
+        return tuple(map(_end_side, self._asked(self._q_end, self._v_end), modes, self._limit))
 
     def asked(self) -> Array:
         """Return what the step ends with before a limit clips it [N m], (motors,)."""
-        return np.array(self._asked(*self._end()))
+        self._end()
+        return np.array(self._asked(self._q_end, self._v_end))
 
     def push(self, modes: Modes) -> None:
-        """Send what makes the next step one in these modes; see `release`."""
-        u, q, v = (np.array(each)[None, None] for each in (self._u, self._q, self._v))
-        self._send(self._clipping.forced(np.array(modes)[None, None], u, q, v)[0, 0])
+        """Send what makes the next step one in these modes, as `Clipping.forced`; see `release`."""
+        acting = []
+        lacks = []
+        motors = zip(modes, self._kp, self._kd, self._limit, self._u, self._q, self._v, strict=True)
+        for mode, kp, kd, limit, u, q, v in motors:
+            pushed = 2.0 * mode * limit if mode else 0.0
+            acting.append(q + (pushed + kd * v) / kp)
+            lacks.append(0.0 if mode else kp * (u - acting[-1]))
+        self._send(acting, lacks)
 
     def push_constant(self, torque: Array) -> None:
         """Send what makes the next step one with these torques [N m]; see `release`."""
         q, v = (np.array(each)[None, None] for each in (self._q, self._v))
-        self._send(self._clipping.constant(torque[None, None], q, v)[0, 0])
+        forced = self._clipping.constant(torque[None, None], q, v)[0, 0]
+        self._send(*np.split(forced, 2))
 
     def release(self) -> None:
         """Push no more."""
@@ -111,20 +140,19 @@ class Servos:
         v = state[..., 1 + nq : 1 + nq + len(self._qvel)]
         return q[..., self._joints], v[..., self._joints]
 
-    def _end(self) -> tuple[list[float], list[float]]:
-        """Return the angles that the springs act with, and the rates after the step."""
-        q: list[float] = self._qpos[self._joints].tolist() if self._late else self._q
-        return q, self._qvel[self._joints].tolist()
+    def _end(self) -> None:
+        """Remember the angles that the springs act with, and the rates after the step."""
+        self._q_end = self._of(self._qpos.tolist()) if self._late else self._q
+        self._v_end = self._of(self._qvel.tolist())
 
-    def _asked(self, angles: list[float], rates: list[float]) -> list[float]:
+    def _asked(self, angles: Sequence[float], rates: Sequence[float]) -> list[float]:
         motors = zip(self._kp, self._kd, self._u, angles, rates, strict=True)
         return [kp * (u - q) - kd * v for kp, kd, u, q, v in motors]
 
-    def _send(self, forced: Array) -> None:
-        """Send commands and joint torques, (2 motors,)."""
-        count = len(self._kp)
-        self._ctrl[self.own] = forced[:count]
-        self._forces[self._joints] = forced[count:]
+    def _send(self, acting: ArrayLike, lacks: ArrayLike) -> None:
+        """Send commands and joint torques, (motors,) each."""
+        self._ctrl[self.own] = acting
+        self._forces[self._joints] = lacks
 
 
 def _side(asked: float, limit: float) -> int:
