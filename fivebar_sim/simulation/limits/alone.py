@@ -26,7 +26,7 @@ KEPT = STATE.value | mujoco.mjtState.mjSTATE_WARMSTART.value
 WHOLE = mujoco.mjtState.mjSTATE_INTEGRATION
 """All that the next step depends on."""
 
-FAR = 64
+FAR = 128
 """After so many steps that were right, a quarter as many are taken together; fewer do not pay."""
 
 BEGIN = 512
