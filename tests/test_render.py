@@ -9,7 +9,9 @@ from __future__ import annotations
 import os
 import shutil
 import subprocess
+from contextlib import nullcontext
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -298,6 +300,30 @@ def test_a_gif_shows_the_last_whole_period_and_others_all_of_the_run() -> None:
     assert render.span(shown, ".mp4") == pytest.approx((0.0, 0.95))
     times = render.moments(Span(0.5, 0.25), render.Film(fps=40.0, speed=0.5))
     assert times == pytest.approx(0.5 + 0.0125 * np.arange(20))
+
+
+def test_each_moment_of_a_gif_is_drawn_once(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Also those from whose colours the palette is made; they are shown in their turn."""
+    drawn: list[float] = []
+
+    def frame(time: float) -> render.Frame:
+        drawn.append(time)
+        return np.full((64, 64, 3), round(1e3 * time) % 251, np.uint8)
+
+    stage = SimpleNamespace(frame=frame)
+    monkeypatch.setattr(render, "stage", lambda *asked: nullcontext(stage))
+    shown = posed(FiveBar.load("classic"), steps=950)
+    film = render.Film(64, 64, fps=40.0)
+    assert render.write(shown, tmp_path / "leg.gif", film) == 10
+    times = render.moments(render.span(shown, ".gif"), film)
+    assert sorted(drawn) == times
+
+    frames = [frame(time) for time in times]
+    lasts = render_files.durations(10, 0.25)
+    render_files.write_gif(tmp_path / "alone.gif", frames, frames[::2], lasts)
+    assert (tmp_path / "leg.gif").read_bytes() == (tmp_path / "alone.gif").read_bytes()
 
 
 def test_times_of_a_gif_do_not_add_up_their_rounding() -> None:

@@ -132,9 +132,11 @@ def write(replay: Replay, out: Path, film: Film) -> int:
             render_files.write_mp4(place, frames, film.fps)
         else:
             # Evenly over the film, so that colours that show only at times are in the palette.
-            sample = (drawn.frame(time) for time in times[:: -(-len(times) // SAMPLES)])
+            sample = {time: drawn.frame(time) for time in times[:: -(-len(times) // SAMPLES)]}
+            # Each of them is a frame too, and kept until its turn comes.
+            frames = (sample.pop(time) if time in sample else drawn.frame(time) for time in times)
             shown = render_files.durations(len(times), part.length / film.speed)
-            render_files.write_gif(place, frames, sample, shown)
+            render_files.write_gif(place, frames, list(sample.values()), shown)
     return len(times)
 
 
