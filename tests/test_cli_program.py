@@ -96,10 +96,10 @@ def test_start_and_end_are_quick() -> None:
 import atexit, gc, sys
 from fivebar_sim.cli import main
 atexit.register(lambda: print("frozen:", gc.get_freeze_count() > 0))
-slow = {"rerun", "dm_control", "matplotlib", "mujoco", "scipy", "pyarrow"}
+slow = {"rerun", "dm_control", "matplotlib", "mujoco", "scipy", "pyarrow", "typeguard", "asyncio"}
 main(["--help"])
 print("slow:", sorted({"tyro", "rich", *slow} & set(sys.modules)))
-for args in (["--version"], ["-h"], ["run", "--help"]):
+for args in (["--version"], ["-h"], ["run", "--help"], ["report", "--help"]):
     try:
         main(args)
     except SystemExit as end:
@@ -110,7 +110,7 @@ print("frozen:", gc.get_freeze_count() > 0)
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     said = [line for line in done.stdout.splitlines() if line.startswith(("slow:", "frozen:"))]
     # What was imported is left alone at the end of the process, and only there.
-    assert said == [*4 * ["slow: []"], "frozen: False", "frozen: True"]
+    assert said == [*5 * ["slow: []"], "frozen: False", "frozen: True"]
 
 
 def test_tables_do_without_pandas_unless_something_needs_it(tmp_path: Path) -> None:

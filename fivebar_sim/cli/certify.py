@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from tyro.conf import Positional, arg
 
-from fivebar_sim.cli.common import spinner
+from fivebar_sim.cli.common import Words, spinner
 from fivebar_sim.cli.terminal import FAILED
 from fivebar_sim.errors import ConfigError
 
@@ -25,7 +25,7 @@ EXAMPLES = 2
 
 
 def certify(
-    program: Positional[Annotated[tuple[str, ...], arg(metavar="PROGRAM [ARG ...]")]],
+    program: Positional[Annotated[Words, arg(metavar="PROGRAM [ARG ...]")]],
     /,
     *,
     timeout: Annotated[float, arg(metavar="SECONDS")] = 30.0,

@@ -8,7 +8,17 @@ from typing import TYPE_CHECKING, Annotated
 
 from tyro.conf import arg
 
-from fivebar_sim.cli.common import Order, Scenarios, Settings, batches, orders_of, screen, spinner
+from fivebar_sim.cli.common import (
+    NO_WORDS,
+    Maybe,
+    Order,
+    Scenarios,
+    Settings,
+    batches,
+    orders_of,
+    screen,
+    spinner,
+)
 from fivebar_sim.cli.terminal import FAILED, WRONG, say
 from fivebar_sim.errors import ConfigError, DivergedError, RunDirectoryError
 
@@ -19,12 +29,12 @@ if TYPE_CHECKING:
 
 
 def check(
-    scenarios: Scenarios = (),
+    scenarios: Scenarios = NO_WORDS,
     /,
     *,
-    settings: Settings = (),
+    settings: Settings = NO_WORDS,
     update: bool = False,
-    junit: Annotated[Path | None, arg(metavar="FILE")] = None,
+    junit: Annotated[Maybe[Path], arg(metavar="FILE")] = None,
     summary: Annotated[str, arg(metavar="FILE")] = "",
     keep: Annotated[Path, arg(metavar="DIR")] = Path("runs/failed"),
     quiet: bool = False,

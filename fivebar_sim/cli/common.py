@@ -5,9 +5,16 @@ from __future__ import annotations
 import sys
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import nullcontext
-from typing import TYPE_CHECKING, Annotated
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, TypeVar
 
 from tyro.conf import Positional, UseAppendAction, arg
+from tyro.constructors import (
+    ConstructorRegistry,
+    PrimitiveConstructorSpec,
+    PrimitiveTypeInfo,
+    UnsupportedTypeAnnotationError,
+)
 
 from fivebar_sim.cli import memory, terminal
 from fivebar_sim.errors import ConfigError, FiveBarError
@@ -16,8 +23,48 @@ if TYPE_CHECKING:
     from fivebar_sim.rollout import AnyPlan
     from fivebar_sim.scenario import Scenario
 
-Scenarios = Positional[Annotated[tuple[str, ...], arg(metavar="[SCENARIO ...]")]]
-Settings = UseAppendAction[Annotated[tuple[str, ...], arg(name="set", metavar="KEY=VALUE")]]
+
+# The parser looks whether a default is of its parameter's type: itself for classes and unions as
+# typing writes them, and else with typeguard, which takes as long to import as the parser.
+T = TypeVar("T")
+Maybe = T | None
+"""What may be left out, as a parameter's type."""
+
+
+class Words(tuple[str, ...]):
+    """Any number of words, as a parameter's type."""
+
+    __slots__ = ()
+
+
+class Paths(tuple[Path, ...]):
+    """Any number of paths, as a parameter's type."""
+
+    __slots__ = ()
+
+
+NO_WORDS = Words()
+NO_PATHS = Paths()
+MANY = {Words: tuple[str, ...], Paths: tuple[Path, ...]}
+"""What the parser reads each of these as."""
+
+TYPES = ConstructorRegistry()
+"""Has the parser read them."""
+
+
+@TYPES.primitive_rule
+def _many(
+    info: PrimitiveTypeInfo,
+) -> PrimitiveConstructorSpec | UnsupportedTypeAnnotationError | None:
+    if info.type not in MANY:
+        return None
+    return ConstructorRegistry.get_primitive_spec(
+        PrimitiveTypeInfo.make(MANY[info.type], info.markers)
+    )
+
+
+Scenarios = Positional[Annotated[Words, arg(metavar="[SCENARIO ...]")]]
+Settings = UseAppendAction[Annotated[Words, arg(name="set", metavar="KEY=VALUE")]]
 
 NARROWEST = 80
 """Columns that tables are laid out for: in fewer, numbers would be cut."""

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from tyro.conf import Positional, UseAppendAction, arg
 
-from fivebar_sim.cli.common import Settings, screen, spinner
+from fivebar_sim.cli.common import NO_WORDS, Maybe, Settings, Words, screen, spinner
 from fivebar_sim.cli.terminal import FAILED
 
 if TYPE_CHECKING:
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
     from fivebar_sim.overlay.compare import Compared, Judged
 
-Limits = UseAppendAction[Annotated[tuple[str, ...], arg(name="limit", metavar="KEY=VALUE")]]
+Limits = UseAppendAction[Annotated[Words, arg(name="limit", metavar="KEY=VALUE")]]
 
 
 def compare(
@@ -23,11 +23,11 @@ def compare(
     log: Positional[Annotated[Path, arg(metavar="LOG")]],
     /,
     *,
-    settings: Settings = (),
-    limits: Limits = (),
+    settings: Settings = NO_WORDS,
+    limits: Limits = NO_WORDS,
     settled: float = 0.25,
-    out: Annotated[Path | None, arg(metavar="HTML")] = None,
-    recording: Annotated[Path | None, arg(metavar="RRD")] = None,
+    out: Annotated[Maybe[Path], arg(metavar="HTML")] = None,
+    recording: Annotated[Maybe[Path], arg(metavar="RRD")] = None,
     quiet: bool = False,
     json: bool = False,
 ) -> int:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from tyro.conf import Positional, arg
 
-from fivebar_sim.cli.common import Settings, screen, spinner
+from fivebar_sim.cli.common import NO_WORDS, Settings, screen, spinner
 from fivebar_sim.cli.terminal import FAILED, say
 from fivebar_sim.errors import ArgumentError, DivergedError, FiveBarError
 
@@ -21,7 +21,7 @@ def converge(
     scenario: Positional[Annotated[str, arg(metavar="SCENARIO")]],
     /,
     *,
-    settings: Settings = (),
+    settings: Settings = NO_WORDS,
     halvings: int = 2,
     bar: float = 2.0,
     alone: bool = False,

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 from tyro.conf import Positional, arg
 
-from fivebar_sim.cli.common import screen, spinner
+from fivebar_sim.cli.common import Maybe, screen, spinner
 from fivebar_sim.cli.progress import Progress
 from fivebar_sim.cli.terminal import FAILED, say
 from fivebar_sim.errors import ArgumentError
@@ -50,9 +50,9 @@ def design(
     *,
     out: Annotated[Path, arg(metavar="DIR")],
     threads: int = 0,
-    simulate: int | None = None,
+    simulate: Maybe[int] = None,
     tolerance: float = 0.2,
-    ray: Annotated[str | None, arg(metavar="HOST:PORT")] = None,
+    ray: Annotated[Maybe[str], arg(metavar="HOST:PORT")] = None,
     quiet: bool = False,
 ) -> int:
     """Search which leg should be built for a task, and certify the best.

@@ -8,6 +8,7 @@ from typing import Annotated
 
 from tyro.conf import Positional, arg
 
+from fivebar_sim.cli.common import Maybe
 from fivebar_sim.errors import ConfigError
 
 
@@ -15,16 +16,16 @@ def export(
     what: Positional[Annotated[str, arg(metavar="LEG|SCENARIO|ROBOT|RUN_DIR")]],
     /,
     *,
-    mjcf: Annotated[Path | None, arg(metavar="FILE")] = None,
-    urdf: Annotated[Path | None, arg(metavar="FILE")] = None,
+    mjcf: Annotated[Maybe[Path], arg(metavar="FILE")] = None,
+    urdf: Annotated[Maybe[Path], arg(metavar="FILE")] = None,
     robot: bool = False,
-    c: Annotated[str | None, arg(metavar="DIR")] = None,
-    table: Annotated[Path | None, arg(metavar="FILE")] = None,
+    c: Annotated[Maybe[str], arg(metavar="DIR")] = None,
+    table: Annotated[Maybe[Path], arg(metavar="FILE")] = None,
     unit: Annotated[str, arg(metavar="UNIT")] = "rad",
     rate: Annotated[float, arg(metavar="HZ")] = 50.0,
     servos: Annotated[str, arg(metavar="TABLE")] = "hanging",
-    ends: Annotated[tuple[int, int] | None, arg(metavar="FIRST LAST")] = None,
-    mcap: Annotated[Path | None, arg(metavar="FILE")] = None,
+    ends: Annotated[Maybe[tuple[int, int]], arg(metavar="FIRST LAST")] = None,
+    mcap: Annotated[Maybe[Path], arg(metavar="FILE")] = None,
 ) -> int:
     """Write a leg as MJCF, URDF or C, a gait as a table, a run as MCAP.
 

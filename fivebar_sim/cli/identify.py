@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from tyro.conf import Positional, UseAppendAction, arg
 
-from fivebar_sim.cli.common import Settings, screen, spinner
+from fivebar_sim.cli.common import NO_WORDS, Maybe, Settings, Words, screen, spinner
 from fivebar_sim.cli.terminal import FAILED
 from fivebar_sim.errors import ConfigError
 
@@ -17,20 +17,20 @@ if TYPE_CHECKING:
     from fivebar_sim.identify.measured import Measured
     from fivebar_sim.identify.motions import Suggestion
 
-Keys = UseAppendAction[Annotated[tuple[str, ...], arg(metavar="KEY")]]
-Files = UseAppendAction[Annotated[tuple[str, ...], arg(metavar="LOG")]]
+Keys = UseAppendAction[Annotated[Words, arg(metavar="KEY")]]
+Files = UseAppendAction[Annotated[Words, arg(metavar="LOG")]]
 
 
 def identify(
     scenario: Positional[Annotated[str, arg(metavar="SCENARIO")]],
-    logs: Positional[Annotated[tuple[str, ...], arg(metavar="LOG ...")]],
+    logs: Positional[Annotated[Words, arg(metavar="LOG ...")]],
     /,
     *,
-    fit: Keys = (),
-    held_out: Files = (),
-    settings: Settings = (),
-    out: Path | None = None,
-    motion: Path | None = None,
+    fit: Keys = NO_WORDS,
+    held_out: Files = NO_WORDS,
+    settings: Settings = NO_WORDS,
+    out: Maybe[Path] = None,
+    motion: Maybe[Path] = None,
     threads: int = 0,
     quiet: bool = False,
     json: bool = False,

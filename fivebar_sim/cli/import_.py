@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from tyro.conf import Positional, arg
 
+from fivebar_sim.cli.common import Maybe
 from fivebar_sim.errors import ConfigError
 
 if TYPE_CHECKING:
@@ -17,12 +18,12 @@ def import_(
     file: Positional[Annotated[Path, arg(metavar="FILE")]],
     /,
     *,
-    out: Annotated[Path | None, arg(metavar="LEG.toml")] = None,
-    picture: Annotated[Path | None, arg(metavar="SVG|PNG")] = None,
-    motors: Annotated[str | None, arg(metavar="A,E")] = None,
-    foot: Annotated[str | None, arg(metavar="NAME")] = None,
-    closures: Annotated[Path | None, arg(metavar="YAML")] = None,
-    loop: Annotated[str | None, arg(metavar="NAME")] = None,
+    out: Annotated[Maybe[Path], arg(metavar="LEG.toml")] = None,
+    picture: Annotated[Maybe[Path], arg(metavar="SVG|PNG")] = None,
+    motors: Annotated[Maybe[str], arg(metavar="A,E")] = None,
+    foot: Annotated[Maybe[str], arg(metavar="NAME")] = None,
+    closures: Annotated[Maybe[Path], arg(metavar="YAML")] = None,
+    loop: Annotated[Maybe[str], arg(metavar="NAME")] = None,
 ) -> int:
     """Understand the five-bar leg of an MJCF or URDF, as a preset.
 

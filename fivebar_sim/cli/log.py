@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from tyro.conf import Positional, arg
 
-from fivebar_sim.cli.common import screen, spinner
+from fivebar_sim.cli.common import Maybe, screen, spinner
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -21,8 +21,8 @@ def log(
     file: Positional[Annotated[Path, arg(metavar="FILE")]],
     /,
     *,
-    leg: str | None = None,
-    write: Annotated[Path | None, arg(name="map", metavar="TOML")] = None,
+    leg: Maybe[str] = None,
+    write: Annotated[Maybe[Path], arg(name="map", metavar="TOML")] = None,
 ) -> int:
     """Show what a log holds: columns, rate, gaps, ranges, and guesses.
 

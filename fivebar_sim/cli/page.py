@@ -7,12 +7,14 @@ from typing import Annotated
 
 from tyro.conf import Positional, arg
 
+from fivebar_sim.cli.common import Maybe
+
 
 def page(
     leg: Positional[Annotated[str, arg(metavar="LEG")]],
     /,
     *,
-    out: Annotated[Path | None, arg(metavar="HTML")] = None,
+    out: Annotated[Maybe[Path], arg(metavar="HTML")] = None,
 ) -> int:
     """Write a leg to play with on one HTML page, in any browser.
 

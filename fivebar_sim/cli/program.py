@@ -190,8 +190,7 @@ def _call(args: list[str]) -> int:
     terminal.style(allowed=all(arg.isprintable() for arg in args))
     # Without the parsers of all other commands, which take three times as long.
     command = _command(name)
-    config = (tyro.conf.FlagCreatePairsOff,)
-    return tyro.cli(command, prog=f"fivebar {name}", args=args[1:], config=config)
+    return tyro.cli(command, prog=f"fivebar {name}", args=args[1:], **_parsing())
 
 
 def _overview() -> str:
@@ -234,9 +233,18 @@ def _print_completion(shells: list[str]) -> int:
         {name: _command(name) for name in COMMANDS},
         prog="fivebar",
         args=["--tyro-print-completion", *shells],
-        config=(tyro.conf.FlagCreatePairsOff,),
+        **_parsing(),
     )
     return 0
+
+
+def _parsing() -> dict[str, Any]:
+    """Return how arguments are parsed."""
+    import tyro
+
+    from fivebar_sim.cli.common import TYPES
+
+    return {"config": (tyro.conf.FlagCreatePairsOff,), "registry": TYPES}
 
 
 def function_of(name: str) -> Callable[..., int]:

@@ -7,19 +7,19 @@ from typing import Annotated
 
 from tyro.conf import Positional, arg
 
-from fivebar_sim.cli.common import spinner
+from fivebar_sim.cli.common import Maybe, spinner
 
 
 def render(
     run_dir: Positional[Annotated[Path, arg(metavar="RUN_DIR")]],
     /,
     *,
-    out: Annotated[str | None, arg(metavar="FILE")] = None,
+    out: Annotated[Maybe[str], arg(metavar="FILE")] = None,
     fps: float = 30.0,
     speed: float = 1.0,
     width: int = 640,
     height: int = 480,
-    at: Annotated[float | None, arg(metavar="SECONDS")] = None,
+    at: Annotated[Maybe[float], arg(metavar="SECONDS")] = None,
 ) -> int:
     """Draw a run: leg, target path, the foot's trail, the ground's force.
 

@@ -7,14 +7,17 @@ from typing import Annotated
 
 from tyro.conf import Positional, arg
 
+from fivebar_sim.cli.common import NO_PATHS, Paths
 from fivebar_sim.errors import ConfigError
 from fivebar_sim.render import screen
 
 RunDir = Positional[Annotated[Path, arg(metavar="RUN_DIR")]]
-RunDirs = Positional[Annotated[tuple[Path, ...], arg(metavar="[RUN_DIR ...]")]]
+RunDirs = Positional[Annotated[Paths, arg(metavar="[RUN_DIR ...]")]]
 
 
-def replay(run_dir: RunDir, others: RunDirs = (), /, *, web: bool = False, port: int = 0) -> int:
+def replay(
+    run_dir: RunDir, others: RunDirs = NO_PATHS, /, *, web: bool = False, port: int = 0
+) -> int:
     """Open the recordings of runs in the Rerun viewer, on this machine.
 
     Args:

@@ -7,15 +7,15 @@ from typing import Annotated
 
 from tyro.conf import Positional, arg
 
-from fivebar_sim.cli.common import spinner
+from fivebar_sim.cli.common import Maybe, Paths, spinner
 
 
 def report(
-    run_dirs: Positional[Annotated[tuple[Path, ...], arg(metavar="RUN_DIR [RUN_DIR ...]")]],
+    run_dirs: Positional[Annotated[Paths, arg(metavar="RUN_DIR [RUN_DIR ...]")]],
     /,
     *,
-    out: Annotated[Path | None, arg(metavar="HTML")] = None,
-    png: Annotated[Path | None, arg(metavar="DIR")] = None,
+    out: Annotated[Maybe[Path], arg(metavar="HTML")] = None,
+    png: Annotated[Maybe[Path], arg(metavar="DIR")] = None,
     quiet: bool = False,
 ) -> int:
     """Explain a run, or compare several, on one self-contained HTML page.

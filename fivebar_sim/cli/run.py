@@ -8,7 +8,16 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 from tyro.conf import arg
 
-from fivebar_sim.cli.common import Order, Scenarios, Settings, orders_of, screen, spinner
+from fivebar_sim.cli.common import (
+    NO_WORDS,
+    Maybe,
+    Order,
+    Scenarios,
+    Settings,
+    orders_of,
+    screen,
+    spinner,
+)
 from fivebar_sim.cli.terminal import FAILED, say
 from fivebar_sim.errors import ConfigError, DivergedError
 
@@ -20,14 +29,14 @@ if TYPE_CHECKING:
 
 
 def run(
-    scenarios: Scenarios = (),
+    scenarios: Scenarios = NO_WORDS,
     /,
     *,
-    out: Annotated[str | None, arg(metavar="DIR")] = None,
-    settings: Settings = (),
-    log: Annotated[Literal["csv", "mcap"] | None, arg(metavar="{csv,mcap}")] = None,
+    out: Annotated[Maybe[str], arg(metavar="DIR")] = None,
+    settings: Settings = NO_WORDS,
+    log: Annotated[Maybe[Literal["csv", "mcap"]], arg(metavar="{csv,mcap}")] = None,
     live: bool = False,
-    live_at: Annotated[str | None, arg(metavar="HOST:PORT")] = None,
+    live_at: Annotated[Maybe[str], arg(metavar="HOST:PORT")] = None,
     quiet: bool = False,
     json: bool = False,
 ) -> int:

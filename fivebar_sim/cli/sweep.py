@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from tyro.conf import Positional, UseAppendAction, arg
 
-from fivebar_sim.cli.common import Settings, screen
+from fivebar_sim.cli.common import NO_WORDS, Maybe, Settings, Words, screen
 from fivebar_sim.cli.progress import Progress
 from fivebar_sim.cli.terminal import FAILED, say
 from fivebar_sim.errors import ConfigError
@@ -18,12 +18,12 @@ if TYPE_CHECKING:
     from fivebar_sim.sweep.study import Study
     from fivebar_sim.workers.here import Workers
 
-Vary = UseAppendAction[Annotated[tuple[str, ...], arg(metavar="KEY=LOW:HIGH:N")]]
-Plot = UseAppendAction[Annotated[tuple[str, ...], arg(metavar="METRIC")]]
+Vary = UseAppendAction[Annotated[Words, arg(metavar="KEY=LOW:HIGH:N")]]
+Plot = UseAppendAction[Annotated[Words, arg(metavar="METRIC")]]
 WORTH = 50_000
 """Physics steps that are worth a process: two seconds of simulation, planning and measuring."""
 
-Over = UseAppendAction[Annotated[tuple[str, ...], arg(metavar="KEY")]]
+Over = UseAppendAction[Annotated[Words, arg(metavar="KEY")]]
 
 
 def sweep(
@@ -31,14 +31,14 @@ def sweep(
     /,
     *,
     out: Annotated[Path, arg(metavar="DIR")],
-    vary: Vary = (),
-    settings: Settings = (),
-    sample: int | None = None,
+    vary: Vary = NO_WORDS,
+    settings: Settings = NO_WORDS,
+    sample: Maybe[int] = None,
     seed: int = 0,
-    plot: Plot = (),
-    over: Over = (),
+    plot: Plot = NO_WORDS,
+    over: Over = NO_WORDS,
     processes: int = 0,
-    ray: Annotated[str | None, arg(metavar="HOST:PORT")] = None,
+    ray: Annotated[Maybe[str], arg(metavar="HOST:PORT")] = None,
     quiet: bool = False,
 ) -> int:
     """Simulate a scenario for all values of some of its keys.

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from tyro.conf import Positional, arg
 
+from fivebar_sim.cli.common import Maybe
 from fivebar_sim.cli.terminal import say
 
 if TYPE_CHECKING:
@@ -19,8 +20,8 @@ def workspace(
     leg: Positional[Annotated[str, arg(metavar="LEG")]],
     /,
     *,
-    out: Annotated[str | None, arg(metavar="PNG")] = None,
-    path: Annotated[str | None, arg(metavar="SCENARIO")] = None,
+    out: Annotated[Maybe[str], arg(metavar="PNG")] = None,
+    path: Annotated[Maybe[str], arg(metavar="SCENARIO")] = None,
 ) -> int:
     """Draw what a leg's foot can reach, and how deep inside it is.
 
