@@ -15,7 +15,7 @@ from shell import Shell
 from fivebar_sim import kinematics, metrics, rollout
 from fivebar_sim.arrays import Array
 from fivebar_sim.errors import ConfigError
-from fivebar_sim.metrics import branch, ground, load
+from fivebar_sim.metrics import branch, energy, ground, load
 from fivebar_sim.metrics.catalogue import ROBOTS, SHOWN, shown
 from fivebar_sim.rollout import Plan, Result
 from fivebar_sim.scenario import Scenario
@@ -305,7 +305,7 @@ def test_refusal_is_one_line(shell: Shell, settings: list[str], message: str) ->
 
 @pytest.mark.parametrize("kind", SCENES)
 def test_what_the_recorder_keeps_is_what_the_record_tells(kind: str) -> None:
-    """Branch and joints' heights are taken of the simulated states, block by block."""
+    """Branch, joints' heights and directions are taken of the simulated states, block by block."""
     plan, result = done(kind)
     (recorder,) = rollout._recorded([plan], 1)
     leg = plan.scenario.leg
@@ -315,3 +315,9 @@ def test_what_the_recorder_keeps_is_what_the_record_tells(kind: str) -> None:
     assert (kept.heights == {}) == ("ground_z" not in result.record)
     for name, height in (kept.heights or {}).items():
         assert np.array_equal(height, ground.heights_of(leg, result.record)[name])
+    body = energy.Body(leg, plan.scenario.payload, plan.scenario.trunk)
+    found = energy.balance(body, result.record, kept.steps)
+    told = energy.balance(body, result.record, kept.steps._replace(before=None))
+    assert np.array_equal(found.ground, told.ground)
+    assert np.array_equal(found.step, told.step)
+    assert np.array_equal(found.unaccounted, told.unaccounted)

@@ -59,6 +59,10 @@ class Pose(NamedTuple):
     a3: Scalar = math.nan
     b3: Scalar = math.nan
 
+    def links(self, rows: slice) -> Pose:
+        """Return the directions of some of many poses (N,), without how the motors turn them."""
+        return Pose(*((x[rows], z[rows]) for x, z in self[:4]))
+
 
 @dataclass(frozen=True, slots=True)
 class Chain:

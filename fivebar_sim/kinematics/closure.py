@@ -187,16 +187,32 @@ def chain_points(leg: FiveBar | LegArrays, q: Array) -> Points:
         leg: The leg; or n legs, with q of shape (n, 4).
         q: (theta_A, theta_B, theta_E, theta_D) [rad], knees relative to L1 and L4, (..., 4).
     """
+    return points_along(leg, q, directions(q))
+
+
+def directions(q: Array) -> tuple[Array, Array, Array, Array]:
+    """Return the directions of L1..L4 at joint angles as in `chain_points`, (..., 2) each."""
+    return (
+        unit(q[..., 0]),
+        unit(q[..., 0] + q[..., 1]),
+        unit(q[..., 2] + q[..., 3]),
+        unit(q[..., 2]),
+    )
+
+
+def points_along(
+    leg: FiveBar | LegArrays, q: Array, along: tuple[Array, Array, Array, Array]
+) -> Points:
+    """Return the `chain_points` of joint angles whose `directions` are known."""
+    e1, e2, e3, e4 = along
     A, E = bases(leg)
-    psi2 = q[..., 0] + q[..., 1]
-    psi3 = q[..., 2] + q[..., 3]
-    B = A + leg.L1 * unit(q[..., 0])
-    D = E + leg.L4 * unit(q[..., 2])
-    C_left = B + leg.L2 * unit(psi2)
-    C_right = D + leg.L3 * unit(psi3)
+    B = A + leg.L1 * e1
+    D = E + leg.L4 * e4
+    C_left = B + leg.L2 * e2
+    C_right = D + leg.L3 * e3
     # Without an extension a fifth of the trigonometry would be multiplied by zero.
     plain = isinstance(leg, FiveBar) and leg.L6 == 0.0
-    F = C_left + (0.0 if plain else leg.L6 * unit(psi2 + leg.bend))
+    F = C_left + (0.0 if plain else leg.L6 * unit(q[..., 0] + q[..., 1] + leg.bend))
     return Points(B, C_left, C_right, D, F)
 
 

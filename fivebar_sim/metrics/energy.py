@@ -68,11 +68,13 @@ class Steps(NamedTuple):
         constraint: Joint forces of all constraints in each step: loop, ground, gear friction and
             ends of travel, (N, nq).
         force: Pushes on the foot in each step [N], (N, 2), or (N, 0) for none.
+        before: Poses before each step, (N,) each; None: the record tells them.
     """
 
     start: Array
     constraint: Array
     force: Array
+    before: Pose | None = None
 
 
 @dataclass(frozen=True)
@@ -221,13 +223,11 @@ def _works(
     # Rates belong to the middle of the step that they moved the leg by; see above.
     middle = tuple(q - 0.5 * h * v for q, v in zip(m.q, m.v, strict=True))
     kinetic, potential = _energies(body, chain, middle, m.v, m.hip - 0.5 * h * m.hip_dot, m.hip_dot)
-    pose = _open_pose(tuple(q[:-1] for q in m.q))
+    pose = steps.before.links(rows) if steps.before else _open_pose(tuple(q[:-1] for q in m.q))
     x, z = _foot_rates(leg, pose, m.w[0], m.w[0] + m.w[1])
     none = np.zeros(len(m.lift))
-    force = none
-    if steps.force.size:
-        force = h * (steps.force[rows, 0] * x + steps.force[rows, 1] * z)
-
+    acts = steps.force.size > 0
+    force = h * (steps.force[rows, 0] * x + steps.force[rows, 1] * z) if acts else none
     ground = none
     if "ground_z" in record:
         first = kinematics.chain_points(leg, steps.start[-4:]).F[1]

@@ -12,6 +12,7 @@ from fivebar_sim.arrays import Array, Bools
 from fivebar_sim.control.servo import Drive, MotorStep, applied_torque
 from fivebar_sim.control.servo import saturated as clipped
 from fivebar_sim.dynamics import gears
+from fivebar_sim.kinematics.closure import points_along
 from fivebar_sim.kinematics.stops import Ranges
 from fivebar_sim.metrics.columns import (
     BELT_COLUMN,
@@ -49,10 +50,21 @@ class Part(NamedTuple):
     foot: gears.Foot | None = None
 
 
-def points(planned: Plan, part: Part) -> kinematics.Points:
-    """Return the joints after each step [m], hip frame, (N, 2) each, the loop open by its gap."""
+def points(
+    planned: Plan, part: Part, along: tuple[Array, Array, Array, Array] | None = None
+) -> kinematics.Points:
+    """Return the joints after each step [m], hip frame, (N, 2) each, the loop open by its gap.
+
+    Args:
+        planned: The plan that was simulated.
+        part: Its steps, all or some.
+        along: Their `directions`, if somebody has them already.
+    """
     # From qpos itself: MuJoCo's site positions are those before the step.
-    return kinematics.chain_points(planned.scenario.leg, _joints(part.states)[0])
+    q = _joints(part.states)[0]
+    if along is None:
+        return kinematics.chain_points(planned.scenario.leg, q)
+    return points_along(planned.scenario.leg, q, along)
 
 
 def columns(planned: Plan, part: Part, points: kinematics.Points) -> Record:

@@ -8,7 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fivebar_sim.arrays import Array, Bools, blocks
+from fivebar_sim.dynamics.chain import Pose
 from fivebar_sim.errors import DivergedError
+from fivebar_sim.kinematics.closure import directions
 from fivebar_sim.metrics import branch, energy, ground
 from fivebar_sim.metrics.columns import Record
 from fivebar_sim.metrics.tracking import left_path
@@ -39,6 +41,9 @@ class Recorder:
         self._columns: Record = {}
         self._heights: Record = {}
         self._signs: NDArray[np.int8] = np.empty((3, steps), dtype=np.int8)
+        # Of the links, (x, z) each: before the first step too.
+        self._along: Array = np.empty((4, 2, steps + 1))
+        self._along[..., 0] = directions(planned.start[-4:])
         self._constraint: Array = np.empty((steps, planned.model.nv))
         self._saturated: Bools = np.empty((steps, 2), dtype=bool)
         self._unsolved: Bools = np.empty(steps, dtype=bool)
@@ -66,9 +71,12 @@ class Recorder:
         rows = slice(self._done, self._done + states.time.shape[1])
         # The states of a breakdown may overflow; such an angle counts as off the path.
         with np.errstate(all="ignore") if self.error is not None else nullcontext():
-            points = record.points(planned, part)
+            along = directions(states.qpos[0, :, -4:])
+            points = record.points(planned, part, along)
             self._fill(self._columns, rows, record.columns(planned, part, points))
-            # Of the same points, which take sines and cosines: the branch, and depths in the floor.
+            # Of the same sines and cosines: the energies, the branch, and depths in the floor.
+            for kept, each in zip(self._along, along, strict=True):
+                kept[:, rows.start + 1 : rows.stop + 1] = each.T
             self._signs[:, rows] = branch.signs(planned.scenario.leg, points)
             if "ground_z" in self._columns:
                 self._fill(self._heights, rows, ground.joint_heights(planned.scenario.leg, points))
@@ -96,9 +104,10 @@ class Recorder:
         """The per-step data that the metrics need and the record leaves out."""
         planned = self._planned
         record_so_far = self.record
+        before = Pose(*((x[:-1], z[:-1]) for x, z in self._along))
 
         return Unrecorded(
-            steps=energy.Steps(planned.start, self._constraint, planned.pushes),
+            steps=energy.Steps(planned.start, self._constraint, planned.pushes, before),
             saturated=self._saturated,
             unsolved=self._unsolved,
             warnings=self._warnings,
