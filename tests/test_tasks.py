@@ -169,6 +169,17 @@ def test_leg_arrays_move_as_each_alone(lengths: list[float]) -> None:
         np.testing.assert_array_equal(together.foot_dot[row], alone.foot_dot[0])
 
 
+@pytest.mark.parametrize("preset", ["airhockey", "extended"])
+def test_equal_legs_move_as_one_leg_for_all(preset: str) -> None:
+    """Environments of equal legs have one: not a bit differs from those of many."""
+    leg = FiveBar.load(preset)
+    q = np.random.default_rng(0).normal(size=(3, 5))
+    state = (q, 0.5 + q, np.ones((3, 2, 2)), np.zeros(3, bool))
+    together = motion(LegArrays.of([leg] * 3), *state)
+    for name, ours, theirs in zip(together._fields, motion(leg, *state), together, strict=True):
+        assert ours.tobytes() == theirs.tobytes(), name
+
+
 @pytest.mark.parametrize("drive", ["position", "torque"])
 @pytest.mark.parametrize("speed", [None, 40.0])
 def test_servo_arrays_apply_what_each_servo_does(speed: float | None, drive: Drive) -> None:

@@ -64,7 +64,9 @@ class Episodes:
         self.task = task
         self.size = len(drawn)
         self.low, self.high = task.bounds
-        self._leg = LegArrays.of([each.leg for each in drawn])
+        legs = [each.leg for each in drawn]
+        # Equal legs are one: what depends on the leg alone is then computed once for all steps.
+        self._leg = legs[0] if len(set(legs)) == 1 else LegArrays.of(legs)
         servos = [each.servo for each in drawn]
         self._servo = ServoArrays.of(servos)
         self._starts = starts
