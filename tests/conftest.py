@@ -114,9 +114,14 @@ def right() -> ModuleType:
 
 
 @pytest.fixture
-def without_pandas(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Have programs that are started find no pandas, which the least set-up lacks too."""
+def quick_start(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Have programs that are started find no pandas, which the least set-up lacks too, and no GL.
+
+    MuJoCo would import the one for a screen, which takes a fifth of its import; `render.gl` finds
+    its own.
+    """
     monkeypatch.setenv("PYTHONPATH", str(Path(__file__).with_name("without_pandas")))
+    monkeypatch.setenv("MUJOCO_GL", "disable")
 
 
 @pytest.fixture
@@ -124,7 +129,7 @@ def shell(
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
-    without_pandas: None,
+    quick_start: None,
 ) -> Shell:
     monkeypatch.chdir(tmp_path)
     (tmp_path / "short.toml").write_text(JUDGED, encoding="utf-8")

@@ -21,7 +21,7 @@ FIVEBAR = str(Path(sys.executable).with_name("fivebar"))
 
 
 @pytest.fixture
-def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, without_pandas: None) -> Path:
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, quick_start: None) -> Path:
     monkeypatch.chdir(tmp_path)
     (tmp_path / "short.toml").write_text(JUDGED, encoding="utf-8")
     return tmp_path

@@ -59,7 +59,7 @@ class Writer:
 
 
 @pytest.fixture
-def writer(tmp_path: Path, without_pandas: None) -> Iterator[Writer]:
+def writer(tmp_path: Path, quick_start: None) -> Iterator[Writer]:
     started = Writer(tmp_path / "run")
     yield started
     started.stop()

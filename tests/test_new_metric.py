@@ -47,7 +47,7 @@ print(json.dumps(came))
 
 
 @pytest.fixture
-def fivebar(tmp_path: Path, without_pandas: None) -> Program:
+def fivebar(tmp_path: Path, quick_start: None) -> Program:
     """Return what calls commands of a copy of the package that has the page's metric."""
     # With its bytecode, which holds while a file keeps its time: else all of it is compiled.
     shutil.copytree(ROOT / "fivebar_sim", tmp_path / "fivebar_sim")

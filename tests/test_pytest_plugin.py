@@ -42,7 +42,7 @@ PYTEST = ["-p", pytest_plugin.__name__, "-W", "error", "--import-mode=importlib"
 
 
 @pytest.fixture
-def repository(tmp_path: Path, without_pandas: None) -> Path:
+def repository(tmp_path: Path, quick_start: None) -> Path:
     """Return the folder of the tests of a repository, with two scenarios."""
     (tmp_path / "pyproject.toml").write_text("[tool.pytest.ini_options]\n", encoding="utf-8")
     tests = tmp_path / "tests"
