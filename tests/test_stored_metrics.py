@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -175,8 +176,8 @@ def test_metrics_of_another_scene_are_refused(kept: list[Kept], tmp_path: Path) 
 
 
 def test_every_reader_refuses_alike(shell: Shell) -> None:
-    for name in ("mine", "other"):
-        assert shell("run", "short.toml", "--quiet", "--out", name).status == 0
+    assert shell("run", "short.toml", "--quiet", "--out", "mine").status == 0
+    shutil.copytree("mine", "other")
     metrics = json.loads(Path("mine/metrics.json").read_text())
     del metrics["guards"][0]["ok"]
     _saved(Path("mine"), metrics)
@@ -188,8 +189,8 @@ def test_every_reader_refuses_alike(shell: Shell) -> None:
 
 
 def test_every_reader_refuses_metrics_that_were_made_better(shell: Shell) -> None:
-    for name in ("mine", "other"):
-        assert shell("run", "short.toml", "--quiet", "--out", name).status == 0
+    assert shell("run", "short.toml", "--quiet", "--out", "mine").status == 0
+    shutil.copytree("mine", "other")
     metrics = json.loads(Path("mine/metrics.json").read_text())
     metrics["tracking"]["rms"] *= 0.5
     _saved(Path("mine"), metrics)
