@@ -213,9 +213,13 @@ def test_commands_hold_for_a_control_period(every: int) -> None:
 
 
 @pytest.mark.parametrize("period", [0.001, 0.002])
-def test_what_a_controller_writes_over_its_observation_stays_there(period: float) -> None:
+@pytest.mark.parametrize("settings", [(), ('servo="xl330-m288"',)], ids=["", "back-EMF"])
+def test_what_a_controller_writes_over_its_observation_stays_there(
+    period: float, settings: tuple[str, ...]
+) -> None:
+    options = (*BRIEF, *settings)
     tidy, untidy = (
-        rollout.execute(with_mine(Mine(period=period, after=0.0, wrong=wrong), *BRIEF)).record
+        rollout.execute(with_mine(Mine(period=period, after=0.0, wrong=wrong), *options)).record
         for wrong in ("none", "scribbles")
     )
     assert digest(untidy) == digest(tidy)

@@ -95,6 +95,7 @@ class ControlStep:
         rows = late + 1 + (self._part > 0.0)
         self._theta = np.empty((nsim, rows, 2))
         self._theta_dot = np.zeros_like(self._theta)
+        self._turning: Array | None = None
         noisy = sensors.noise > 0.0 or sensors.rate_noise > 0.0
         self._noise = Noise(nsim) if noisy else None
         self._is_exact = not noisy and sensors.resolution == 0.0 and self._part == 0.0
@@ -111,6 +112,7 @@ class ControlStep:
         """
         self._theta[rows] = start[:, None]
         self._theta_dot[rows] = 0.0
+        self._measure()
         # Until a command arrives a servo holds where it stands, and a bare motor gives nothing.
         self._bus.restart(rows, start if self._drive == "position" else np.zeros_like(start))
         if self._noise is not None:
@@ -120,6 +122,12 @@ class ControlStep:
         """Store the motor angles [rad] and rates [rad/s] of the last n steps, (nsim, n, 2)."""
         self._theta = _last(self._theta, theta)
         self._theta_dot = _last(self._theta_dot, theta_dot)
+        self._measure()
+
+    def _measure(self) -> None:
+        """Have the driver measure the motors' rates: an agent may write over what it is shown."""
+        if self._back_emf:
+            self._turning = self._back_emf * self._theta_dot[:, -1:]
 
     def observe(self, k: Steps, rows: NDArray[np.int64] | None = None) -> Observation:
         """Return what the sensors show at step k; the time is (nsim,) if k is.
@@ -162,10 +170,10 @@ class ControlStep:
             command: (A, E) [rad or N m], (nsim, 2).
         """
         sent = self._bus.send(k, command)
-        if self._back_emf == 0.0:
+        if self._turning is None:
             return sent
         # The driver sits on the motor and knows its present rate, without the sensors' delay.
-        return sent + self._back_emf * self._theta_dot[:, -1:]
+        return sent + self._turning
 
 
 def _last(before: Array, new: Array) -> Array:
