@@ -30,6 +30,10 @@ from fivebar_sim.scenario.scenes import Ground, Payload, Scene, Treadmill, named
 HIP_HEIGHT = 1.3
 """Height of a fixed hip above the floor, in leg sizes: the foot cannot touch the floor."""
 
+CLEAR = 1e-9
+"""Least height of a foot above the floor at the start of a run [m]: exactly on it, the last bit of
+that height, another on other processors, would decide whether it touches in the first step."""
+
 KEPT = 32
 """Models that are kept, of 0.3 MB each: to compile one takes fourteen times as long as a copy."""
 

@@ -51,7 +51,8 @@ class Ground(Scene, frozen=True):
 
     Attributes:
         mass: Mass of the trunk on the hip [kg].
-        drop: Height of the foot above the floor at the start [m]; 0 starts standing.
+        drop: Height of the foot above the floor at the start [m]; 0 starts standing, that is, a
+            nanometre above it.
         friction: Coulomb's coefficient between foot and floor; 0 is practically frictionless.
         stop: Lowest height of the hip above the floor [m]: there the rail ends. If its end carries
             the trunk, the guard "rail" fails the run. None: no end.

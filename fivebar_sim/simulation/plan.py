@@ -125,7 +125,7 @@ def _above_ground(scenario: Scenario, scene: Ground, q: Array) -> Array:
     Raises:
         ConfigError: The rail ends above the hip.
     """
-    height = model.standing(scenario.leg, q) + scene.drop
+    height = model.standing(scenario.leg, q) + max(scene.drop, model.CLEAR)
     if scene.stop is not None and not scene.stop <= height:
         raise ConfigError(
             f"scene.stop must be in [0, {height:g}] m, the hip's height at the start, "

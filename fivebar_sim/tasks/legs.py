@@ -167,5 +167,6 @@ def starts(task: Task) -> Array:
     if not isinstance(task.scene, Ground):
         return q
 
-    height = [model.standing(task.leg, pose) + task.scene.drop for pose in q]
+    drop = max(task.scene.drop, model.CLEAR)
+    height = [model.standing(task.leg, pose) + drop for pose in q]
     return np.concatenate([np.array(height)[:, None], q], axis=1)

@@ -35,7 +35,7 @@ class RobotPlan(NamedTuple):
         legs: The plan of each leg, in the order of `LEGS`, as if it were alone in the air; each has
             the robot's model.
         model: The compiled MuJoCo model.
-        start: qpos at t = 0: level, at rest, the lowest foot on the floor.
+        start: qpos at t = 0: level, at rest, the lowest foot `CLEAR` of the floor.
         setpoints: What reaches the motors in every step [rad], (N, 8); None where a feedback
             controller decides during the run.
         pushes: Forces on the trunk in every step [N], (N, 3) for each push.
@@ -156,7 +156,7 @@ def plan_scenario(scenario: RobotScenario) -> RobotPlan:
     poses = np.stack([leg.start for leg in legs])
     start = np.concatenate([turns[0], poses], axis=1).ravel()
     if isinstance(scenario.scene, Floor):
-        height = standing_height(robot, poses, scenario.scene.ground, turns[0])
+        height = standing_height(robot, poses, scenario.scene.ground, turns[0]) + model.CLEAR
         start = np.concatenate([[0.0, 0.0, height, 1.0, 0.0, 0.0, 0.0], start])
 
     sent = [leg.setpoints for leg in legs if leg.setpoints is not None]
