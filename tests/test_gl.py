@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import subprocess
 import sys
 
 import pytest
@@ -30,3 +31,21 @@ def test_a_gl_is_found_by_trying(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_what_does_not_work_is_found_out() -> None:
     assert not gl.works("no_such_way")
+
+
+MADE_FIRST = """
+from fivebar_sim.render import gl
+
+gl.set_mujoco_gl()
+gl.context()
+from dm_control import _render
+"""
+
+
+@pytest.mark.long
+def test_a_process_ends_in_silence_where_dm_control_shuts_gl_down_first() -> None:
+    pytest.importorskip("dm_control", reason="dm-control has no wheel for this Python")
+    ended = subprocess.run(
+        [sys.executable, "-c", MADE_FIRST], capture_output=True, text=True, check=True
+    )
+    assert ended.stderr == ""

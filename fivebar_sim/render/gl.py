@@ -131,8 +131,14 @@ def _made(way: str) -> Any:
 
 def _free(made: Any, owner: int) -> None:
     """Free a context, unless this is a fork of the process that made it."""
-    if os.getpid() == owner:
+    if os.getpid() != owner:
+        return
+    try:
         made.free()
+    except Exception:
+        # dm_control, if it was imported after the context was made, has shut GL down by now and so
+        # freed it: `__del__` must not try again.
+        made._context = None
 
 
 def set_mujoco_gl() -> None:
