@@ -72,6 +72,23 @@ def test_batch_is_a_plain_loop_to_the_last_bit() -> None:
         np.testing.assert_array_equal(batch, loop)
 
 
+@pytest.mark.parametrize("leg", [RIGID, RIGHT], ids=["with L6", "without"])
+def test_pose_alone_is_one_of_many_to_the_last_bit(leg: FiveBar) -> None:
+    theta = sample(leg, (100,))[1]
+    feet, J = kinematics.foot_and_jacobian(leg, theta)
+    points = kinematics.closed_points(leg, theta)
+    for k, row in enumerate(theta):
+        for shape in ((2,), (1, 2)):
+            one = row.reshape(shape)
+            foot, slope = kinematics.foot_and_jacobian(leg, one)
+            assert (foot.shape, slope.shape) == (shape, (*shape, 2))
+            np.testing.assert_array_equal(foot.ravel(), feet[k])
+            np.testing.assert_array_equal(slope.ravel(), J[k].ravel())
+            for alone, many in zip(kinematics.closed_points(leg, one), points, strict=True):
+                assert alone.shape == shape
+                np.testing.assert_array_equal(alone.ravel(), many[k])
+
+
 # edge
 
 
@@ -108,6 +125,9 @@ def test_singular_poses_name_the_first_index() -> None:
         SingularError, match=r"the pose is singular: B, C .* above 2\.4e-07, got \S+$"
     ):
         kinematics.jacobian(LINE, IN_LINE)
+    with pytest.raises(SingularError, match=r"1 of 1 poses are singular") as info:
+        kinematics.jacobian(LINE, [IN_LINE])
+    assert info.value.index == (0,)
 
     leg = FiveBar(0.25, 0.5, 0.5, 0.375, 0.5)
     still = np.zeros(2)
@@ -119,8 +139,13 @@ def test_singular_poses_name_the_first_index() -> None:
 
 
 def test_open_and_unreachable_and_wrong_shapes_are_refused() -> None:
-    with pytest.raises(LoopOpenError):
-        kinematics.jacobian(RIGHT, (math.pi, 0.0))
+    for theta, count, index in (
+        ((math.pi, 0.0), "here", ()),
+        ([(math.pi, 0.0)], "in 1 of 1", (0,)),
+    ):
+        with pytest.raises(LoopOpenError, match=f"the loop is open {count}") as info:
+            kinematics.jacobian(RIGHT, theta)
+        assert info.value.index == index
     with pytest.raises(UnreachableError):
         kinematics.joint_motion(RIGHT, (0.0, -0.5), (0.0, 0.0), (0.0, 0.0))
     with pytest.raises(ArgumentError, match="assembly must be -1 or 1, got 2"):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from functools import lru_cache
 from typing import NamedTuple
 
@@ -12,7 +14,16 @@ from fivebar_sim.arrays import Array, Bools, as_pairs, at, first_index
 from fivebar_sim.errors import ArgumentError, LoopOpenError
 from fivebar_sim.geometry import FiveBar
 from fivebar_sim.kinematics.leg_arrays import LegArrays
-from fivebar_sim.kinematics.planar import angle_between, cross, dot, perp, turned, unit
+from fivebar_sim.kinematics.planar import (
+    Coordinates,
+    Scalar,
+    angle_between,
+    between,
+    cross,
+    joined,
+    split,
+    unit,
+)
 
 ROUNDING = 16 * np.finfo(float).eps
 """Slack of a squared distance d^2 at the edge of reach, relative to d times the coordinates of the
@@ -30,6 +41,20 @@ class Points(NamedTuple):
     C_right: Array
     D: Array
     F: Array
+
+
+class Corners(NamedTuple):
+    """The joints of closed poses in separate coordinates [m], hip frame: see `planar.split`.
+
+    C is the end of L2 and of L3.
+    """
+
+    A: Coordinates
+    B: Coordinates
+    C: Coordinates
+    D: Coordinates
+    E: Coordinates
+    F: Coordinates
 
 
 class Branch(NamedTuple):
@@ -65,10 +90,48 @@ def _bases(leg: FiveBar | LegArrays) -> tuple[Array, Array]:
 def knees(leg: FiveBar, theta: Array) -> tuple[Array, Array]:
     """Return B = A + L1 e(theta_A) and D = E + L4 e(theta_E) [m], each (..., 2)."""
     A, E = bases(leg)
-    return A + leg.L1 * unit(theta[..., 0]), E + leg.L4 * unit(theta[..., 1])
+    B, D = _knees(leg, A.tolist(), E.tolist(), theta)
+    return joined(B, theta.shape), joined(D, theta.shape)
 
 
-def loop_joint(leg: FiveBar, B: Array, D: Array, *, assembly: int | None = None) -> Array:
+def _knees(
+    leg: FiveBar, A: Sequence[float], E: Sequence[float], theta: Array
+) -> tuple[Coordinates, Coordinates]:
+    cos_A, cos_E = split(np.cos(theta))
+    sin_A, sin_E = split(np.sin(theta))
+    B = A[0] + leg.L1 * cos_A, A[1] + leg.L1 * sin_A
+    return B, (E[0] + leg.L4 * cos_E, E[1] + leg.L4 * sin_E)
+
+
+def corners(leg: FiveBar, theta: Array, assembly: int | None = None) -> Corners:
+    """Return the joints of closed poses in separate coordinates.
+
+    Args:
+        leg: The leg.
+        theta: (theta_A, theta_E) [rad], (..., 2).
+        assembly: +1 or -1; None is the leg's own.
+
+    Raises:
+        LoopOpenError: The links do not meet in some pose.
+    """
+    A, E = (each.tolist() for each in bases(leg))
+    B, D = _knees(leg, A, E, theta)
+    C = loop_joint(leg, B, D, assembly, theta.shape[:-1])
+    if leg.L6 == 0.0:
+        return Corners(A, B, C, D, E, C)
+
+    BC = between(B, C)
+    cos = float(np.cos(leg.bend))
+    sin = float(np.sin(leg.bend))
+    part = leg.L6 / leg.L2
+    x = C[0] + part * (cos * BC[0] - sin * BC[1])
+    z = C[1] + part * (cos * BC[1] + sin * BC[0])
+    return Corners(A, B, C, D, E, (x, z))
+
+
+def loop_joint(
+    leg: FiveBar, B: Coordinates, D: Coordinates, assembly: int | None, batch: tuple[int, ...]
+) -> Coordinates:
     """Return C, the crossing of the circles about B and D on the side that assembly names.
 
     With d = |BD|, u the unit vector along BD, and n = u turned by +90 deg:
@@ -79,12 +142,10 @@ def loop_joint(leg: FiveBar, B: Array, D: Array, *, assembly: int | None = None)
 
     Args:
         leg: The leg.
-        B: End of L1 [m], (..., 2).
-        D: End of L4 [m], (..., 2).
+        B: End of L1 [m].
+        D: End of L4 [m].
         assembly: +1 or -1; None is the leg's own.
-
-    Returns:
-        C [m], (..., 2).
+        batch: Shape of the poses, for the error's index.
 
     Raises:
         LoopOpenError: Unless |L2 - L3| <= d <= L2 + L3 and d > 0 in every pose.
@@ -93,24 +154,31 @@ def loop_joint(leg: FiveBar, B: Array, D: Array, *, assembly: int | None = None)
     if sign not in (-1, 1):
         raise ArgumentError(f"assembly must be -1 or 1, got {assembly!r}")
 
-    BD = D - B
+    x, z = between(B, D)
     low = abs(leg.L2 - leg.L3)
     high = leg.L2 + leg.L3
-    d2 = dot(BD, BD)
+    d2 = x * x + z * z
     # A pose at the very edge of reach counts as closed, whichever way it was rounded. B and D are
     # at most leg.size + L5 from the origin, so this bounds the rounding of their coordinates [m].
     rounding = ROUNDING * (leg.size + leg.L5)
     slack = rounding * high
     # B on D is open: any C at that distance would close the loop.
     closed = (d2 >= low**2 - slack) & (d2 <= high**2 + slack) & (d2 > rounding**2)
-    if not closed.all():
-        raise _loop_open(np.sqrt(d2), ~closed, low, high)
+    if closed is not True and not np.all(closed):
+        raise _loop_open(np.sqrt(d2).reshape(batch), ~np.reshape(closed, batch), low, high)
 
     # Factored, like the root below: a difference of two squares would lose digits.
     along = (d2 + (leg.L2 - leg.L3) * high) / (2.0 * d2)
-    # Within the slack the product may be just below 0: there h is 0.
-    across = np.sqrt(np.maximum((high**2 - d2) * (d2 - low**2), 0.0)) / (2.0 * d2)
-    return B + along[..., None] * BD + sign * across[..., None] * perp(BD)
+    across = sign * (_root((high**2 - d2) * (d2 - low**2)) / (2.0 * d2))
+    return B[0] + along * x - across * z, B[1] + along * z + across * x
+
+
+def _root(square: Scalar) -> Scalar:
+    """Return the root of what only rounding brings below 0, where it is 0."""
+    # NumPy's functions take twenty times as long for one number as those of math.
+    if isinstance(square, float):
+        return math.sqrt(max(square, 0.0))
+    return np.sqrt(np.maximum(square, 0.0))
 
 
 def _loop_open(d: Array, is_open: Bools, low: float, high: float) -> LoopOpenError:
@@ -134,16 +202,16 @@ def closed_points(leg: FiveBar, theta: ArrayLike, *, assembly: int | None = None
     Raises:
         LoopOpenError: The links do not meet in some pose.
     """
-    B, D = knees(leg, as_pairs(theta, "theta"))
-    C = loop_joint(leg, B, D, assembly=assembly)
-    F = C + (leg.L6 / leg.L2) * turned(C - B, leg.bend)
+    theta = as_pairs(theta, "theta")
+    p = corners(leg, theta, assembly)
+    B, C, D, F = (joined(each, theta.shape) for each in (p.B, p.C, p.D, p.F))
     return Points(B, C, C, D, F)
 
 
 def forward(leg: FiveBar, theta: ArrayLike, assembly: int | None = None) -> Array:
     """Return the foot F at given motor angles; F is C if L6 = 0.
 
-        F = C + (L6 / L2) R(bend) (C - B),   C from `loop_joint`
+        F = C + (L6 / L2) R(bend) (C - B),   C as in `loop_joint`
 
     Args:
         leg: The leg.
@@ -157,7 +225,8 @@ def forward(leg: FiveBar, theta: ArrayLike, assembly: int | None = None) -> Arra
         LoopOpenError: Unless |L2 - L3| <= |BD| <= L2 + L3 and |BD| > 0 in every pose; `.index`
             is the first open one.
     """
-    return closed_points(leg, theta, assembly=assembly).F
+    theta = as_pairs(theta, "theta")
+    return joined(corners(leg, theta, assembly).F, theta.shape)
 
 
 def passive(leg: FiveBar, theta: ArrayLike, *, assembly: int | None = None) -> Array:

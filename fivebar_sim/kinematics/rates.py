@@ -10,8 +10,18 @@ from numpy.typing import ArrayLike
 from fivebar_sim.arrays import Array, as_pairs, at, broadcast, finite, first_index
 from fivebar_sim.errors import SingularError
 from fivebar_sim.geometry import FiveBar, Mode
-from fivebar_sim.kinematics.closure import bases, closed_points
-from fivebar_sim.kinematics.planar import angle_between, cross, dot, perp, turned, unit
+from fivebar_sim.kinematics.closure import bases, corners
+from fivebar_sim.kinematics.planar import (
+    Scalar,
+    angle_between,
+    between,
+    cross,
+    dot,
+    joined,
+    perp,
+    turned,
+    unit,
+)
 from fivebar_sim.kinematics.reach import foot_radius_and_angle, inverse
 
 SINGULAR = float(16 * np.sqrt(np.finfo(float).eps))
@@ -66,26 +76,30 @@ def foot_and_jacobian(
         LoopOpenError: The links do not meet.
         SingularError: B, C and D are in line.
     """
-    A, E = bases(leg)
-    p = closed_points(leg, theta, assembly=assembly)
-    AB = p.B - A
-    ED = p.D - E
-    BC = p.C_left - p.B
-    DC = p.C_right - p.D
-    CF = p.F - p.C_left
+    theta = as_pairs(theta, "theta")
+    p = corners(leg, theta, assembly)
+    AB = between(p.A, p.B)
+    ED = between(p.E, p.D)
+    BC = between(p.B, p.C)
+    DC = between(p.D, p.C)
     # At m = 0 the two circles about B and D touch, and C can leave both ways.
-    m = cross(BC, DC)
-    check_sine(m / (leg.L2 * leg.L3), "B, C and D are in line")
+    m = BC[0] * DC[1] - BC[1] * DC[0]
+    check_sine(m / (leg.L2 * leg.L3), "B, C and D are in line", theta.shape[:-1])
 
-    dC_A = (cross(AB, BC) / m)[..., None] * -perp(DC)
-    dC_E = (cross(ED, DC) / m)[..., None] * perp(BC)
+    by_A = (AB[0] * BC[1] - AB[1] * BC[0]) / m
+    by_E = (ED[0] * DC[1] - ED[1] * DC[0]) / m
+    dC_A = by_A * DC[1], -by_A * DC[0]
+    dC_E = -by_E * BC[1], by_E * BC[0]
     # Beyond C the foot is carried along by the turn of L2.
-    psi_A = cross(BC, dC_A - perp(AB)) / leg.L2**2
-    psi_E = cross(BC, dC_E) / leg.L2**2
-    dF_A = dC_A + psi_A[..., None] * perp(CF)
-    dF_E = dC_E + psi_E[..., None] * perp(CF)
-
-    return p.F, np.stack([dF_A, dF_E], axis=-1)
+    psi_A = (BC[0] * (dC_A[1] - AB[0]) - BC[1] * (dC_A[0] + AB[1])) / leg.L2**2
+    psi_E = (BC[0] * dC_E[1] - BC[1] * dC_E[0]) / leg.L2**2
+    CF = between(p.C, p.F)
+    J = np.empty((*theta.shape, 2))
+    J[..., 0, 0] = dC_A[0] - psi_A * CF[1]
+    J[..., 1, 0] = dC_A[1] + psi_A * CF[0]
+    J[..., 0, 1] = dC_E[0] - psi_E * CF[1]
+    J[..., 1, 1] = dC_E[1] + psi_E * CF[0]
+    return joined(p.F, theta.shape), J
 
 
 def joint_motion(
@@ -172,17 +186,21 @@ def _end_motion(r1: Array, r2: Array, rate: Pair, accel: Pair) -> tuple[Array, A
     return velocity, perp(r1) * b1 - r1 * w1**2 + perp(r2) * b2 - r2 * w2**2
 
 
-def check_sine(sine: Array, where: str) -> None:
+def check_sine(sine: Scalar, where: str, batch: tuple[int, ...] | None = None) -> None:
     """Raise if the sine of the angle between two links is no more than rounding.
 
     Args:
         sine: Sine of the angle at each pose, (...).
         where: What it means if it is 0, for the message.
+        batch: Shape of the poses, for the error's index; None: the sine's own.
 
     Raises:
         SingularError: At one pose at least; `.index` is the first.
     """
-    sine = np.asarray(sine)
+    # Of one pose, at once: NumPy takes twenty times as long.
+    if isinstance(sine, float) and abs(sine) > SINGULAR:
+        return
+    sine = np.asarray(sine) if batch is None else np.reshape(sine, batch)
     # Written so that NaN is singular too.
     singular = ~(np.abs(sine) > SINGULAR)
     if singular.any():
