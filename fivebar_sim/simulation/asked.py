@@ -40,12 +40,19 @@ class Asked:
     Args:
         plans: Their plans.
         rows: Which of all plans they are.
+
+    Attributes:
+        name: The controller's.
+        part: Where they are among all plans.
     """
 
     def __init__(self, plans: list[Plan], rows: list[int]) -> None:
         s = plans[0].scenario
         every = period_steps(plans[0])
         self.rows = rows
+        beside = rows == [*range(rows[0], rows[-1] + 1)]
+        # Of rows that follow each other a slice: a list would have to be looked up at every step.
+        self.part = slice(rows[0], rows[-1] + 1) if beside else rows
         self.name = s.controller_name
         controller = cast(Feedback, s.controller)
         self._is_angle = controller.drive == "position"

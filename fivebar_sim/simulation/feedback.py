@@ -200,8 +200,8 @@ class _Loop:
             if len(self._asked) == 1:
                 ctrl[..., -2:] = group.sent(k, latest)
             else:
-                own = None if latest is None else (latest[0][group.rows], latest[1][group.rows])
-                ctrl[group.rows, :, -2:] = group.sent(k, own)
+                own = None if latest is None else (latest[0][group.part], latest[1][group.part])
+                ctrl[group.part, :, -2:] = group.sent(k, own)
         return ctrl
 
     def _broken(self, states: States) -> int | None:
