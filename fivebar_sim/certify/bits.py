@@ -8,6 +8,7 @@ import numpy as np
 
 from fivebar_sim import firmware
 from fivebar_sim.arrays import Array
+from fivebar_sim.certify import suite
 from fivebar_sim.certify.suite import Case
 from fivebar_sim.firmware import Status
 from fivebar_sim.geometry import FiveBar
@@ -67,8 +68,10 @@ def _line(numbers: np.ndarray, status: Status) -> str:
 def same(one: str, other: str) -> bool:
     """Return whether two answers are the same numbers to the bit, or the same refusal."""
     words = [line.split() for line in (one, other)]
+    if words[0] == words[1]:
+        return True
     try:
-        numbers = [np.array([float.fromhex(w) for w in each[1:]], np.float32) for each in words]
+        numbers = [np.array([suite.number(w) for w in each[1:]], np.float32) for each in words]
     except (ValueError, OverflowError):
         return False
     return words[0][:1] == words[1][:1] and numbers[0].tobytes() == numbers[1].tobytes()

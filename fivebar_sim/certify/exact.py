@@ -139,8 +139,7 @@ def _inverse(leg: FiveBar, values: Sequence[float]) -> Answer:
     A, E = kinematics.bases(leg)
     theta, _ = reach.solve(leg, foot, (s_A, s_E))
     rho, _ = reach.foot_radius_and_angle(leg)
-    joints = reach.points_at(leg, foot, theta)
-    C = foot if leg.L6 == 0.0 else joints.C_left
+    C = foot if leg.L6 == 0.0 else reach.points_at(leg, foot, theta).C_left
 
     d_A = float(np.hypot(*(foot - A)))
     d_E = float(np.hypot(*(C - E)))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -78,21 +78,24 @@ def difference(case: Case, precision: str, numbers: tuple[float, ...]) -> tuple[
 
     Angles that differ by whole turns are equal here; `whole_turn` looks at that.
     """
-    finite = np.isfinite(numbers)
-    if not finite.all():
-        return int(np.argmin(finite)), math.inf
+    for k, number in enumerate(numbers):
+        if not math.isfinite(number):
+            return k, math.inf
 
     within = case.within[1] if precision == "float64" else case.within[0]
-    off = np.abs(np.array(numbers) - np.array(case.answer))
+    expected = case.answer
+    turn = TURN
+    if case.kind == "inverse" and precision == "degrees":
+        turn = 360.0
+        expected = tuple(map(math.degrees, expected))
+        within = HALF_STEP + math.degrees(within)
+
+    # Plain floats: of two to four numbers each, NumPy would take ten times as long.
+    off = [abs(a - b) for a, b in zip(numbers, expected, strict=True)]
     if case.kind == "inverse":
-        turn = TURN
-        if precision == "degrees":
-            turn = 360.0
-            off = np.abs(np.array(numbers) - np.degrees(case.answer))
-            within = HALF_STEP + math.degrees(within)
-        off = np.abs((off + 0.5 * turn) % turn - 0.5 * turn)
-    worst = int(np.argmax(off))
-    return worst, float(off[worst] - within)
+        off = [abs((each + 0.5 * turn) % turn - 0.5 * turn) for each in off]
+    worst = off.index(max(off))
+    return worst, off[worst] - within
 
 
 def whole_turn(case: Case, precision: str, numbers: tuple[float, ...]) -> bool:
@@ -108,10 +111,10 @@ def kind(leg: FiveBar, case: Case, precision: str, numbers: tuple[float, ...]) -
     """Return the kind of a fault in numbers that are wrong."""
     if not all(map(math.isfinite, numbers)):
         return "NaN" if any(map(math.isnan, numbers)) else "infinite"
-    got = np.array(numbers)
     if case.kind == "inverse":
-        return _angles_kind(leg, case, precision, got)
+        return _angles_kind(leg, case, precision, numbers)
 
+    got = np.array(numbers)
     expected = np.array(case.answer)
     scale = float(np.abs(expected).max())
     for name, other in _vectors(case, expected):
@@ -142,37 +145,41 @@ def _vectors(case: Case, expected: np.ndarray) -> Iterator[tuple[str, np.ndarray
         yield "z downwards", flipped
 
 
-def _angles_kind(leg: FiveBar, case: Case, precision: str, got: np.ndarray) -> str:
-    expected = np.array(case.answer)
+def _angles_kind(leg: FiveBar, case: Case, precision: str, got: Sequence[float]) -> str:
+    expected = case.answer
     if precision == "degrees":
-        degrees = np.degrees(expected)
-        cut = (np.trunc(degrees), np.floor(degrees))
-        if any(np.array_equal(got, each) for each in cut):
+        degrees = list(map(math.degrees, expected))
+        cut = (list(map(math.trunc, degrees)), list(map(math.floor, degrees)))
+        if list(got) in cut:
             return "truncated, not rounded"
-        got = np.radians(got)
+        got = list(map(math.radians, got))
 
     # An exact hit first: near full stretch the branches lie close together.
     exactly = math.radians(HALF_STEP) if precision == "degrees" else 0.0
     exactly += case.within[1] if precision == "float64" else case.within[0]
     loosely = max(NEAR, exactly)
-    known = list(_known(leg, case, expected))
-    for name, other in known:
+    known = []
+    for name, other in _known(leg, case, expected):
         if _apart(got, other) <= exactly:
             return name
+        known.append((name, other))
     if case.may_refuse and 0.0 in got:
         return "on the edge: answered 0"
     if _apart(got, expected) <= loosely:
-        return "a whole turn off" if np.abs(got).max() > math.pi else "imprecise"
+        return "a whole turn off" if max(map(abs, got)) > math.pi else "imprecise"
     for name, other in known:
         if _apart(got, other) <= loosely:
             return name
     # Degrees are compared without whole turns: 2 pi deg is nothing special.
-    if np.abs(np.radians(got) - expected).max() <= NEAR:
+    off = [abs(math.radians(a) - b) for a, b in zip(got, expected, strict=True)]
+    if max(off) <= NEAR:
         return "degrees"
     return "imprecise" if _apart(got, expected) <= IMPRECISE else "wrong"
 
 
-def _known(leg: FiveBar, case: Case, expected: np.ndarray) -> Iterator[tuple[str, np.ndarray]]:
+def _known(
+    leg: FiveBar, case: Case, expected: Sequence[float]
+) -> Iterator[tuple[str, Sequence[float]]]:
     """Yield the known ways in which angles go wrong."""
     values = [float.fromhex(word) for word in case.inputs[2:]]
     asked = (int(case.inputs[0]), int(case.inputs[1]))
@@ -181,14 +188,15 @@ def _known(leg: FiveBar, case: Case, expected: np.ndarray) -> Iterator[tuple[str
             found = exact.answer(leg, "inverse", [*mode, *values])
             sides = [side for side, a, b in zip("AE", asked, mode, strict=True) if a != b]
             if found.numbers:
-                yield f"wrong branch of {' and '.join(sides)}", np.array(found.numbers)
+                yield f"wrong branch of {' and '.join(sides)}", found.numbers
 
-    yield "wrong sign", -expected
+    yield "wrong sign", [-theta for theta in expected]
     yield "A and E exchanged", expected[::-1]
-    yield "tilt left out", expected - leg.tilt
-    yield "90 deg + angle, as a servo's", expected + 0.5 * math.pi
+    yield "tilt left out", [theta - leg.tilt for theta in expected]
+    yield "90 deg + angle, as a servo's", [theta + 0.5 * math.pi for theta in expected]
 
 
-def _apart(one: np.ndarray, other: np.ndarray) -> float:
+def _apart(one: Sequence[float], other: Sequence[float]) -> float:
     """Return the larger difference of two pairs of angles, whole turns aside [rad]."""
-    return float(np.abs((one - other + math.pi) % TURN - math.pi).max())
+    turned = [(a - b + math.pi) % TURN - math.pi for a, b in zip(one, other, strict=True)]
+    return max(map(abs, turned))

@@ -6,7 +6,7 @@ import itertools
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from fivebar_sim.certify import bits, dialogue, faults
+from fivebar_sim.certify import bits, dialogue, faults, suite
 from fivebar_sim.certify.exact import KEYS
 from fivebar_sim.certify.faults import Fault
 from fivebar_sim.certify.suite import ANSWERS, OK, PRECISIONS, REFUSALS, UNSUPPORTED, Case, Leg
@@ -101,14 +101,15 @@ def judge(legs: Sequence[Leg], said: dialogue.Said) -> Report:
 def _wrong(leg: Leg, precision: str, lines: Sequence[str]) -> list[Fault]:
     """Return what is wrong with the answers to a leg's questions, as far as they came."""
     geometry = geometry_of(leg)
-    golden = bits.answers(geometry, leg.cases) if precision == FIRMWARE else lines
+    to_the_bit = precision == FIRMWARE
+    golden = bits.answers(geometry, leg.cases) if to_the_bit else lines
     found = []
 
     for case, line, own in zip(leg.cases, lines, golden, strict=False):
         if line.strip() == UNSUPPORTED:
             continue
         fault = look(geometry, case, precision, line)
-        if fault is None and not bits.same(line, own):
+        if fault is None and to_the_bit and not bits.same(line, own):
             fault = Fault("other bits than the firmware's", case, _short(line, NUMBERS), own=own)
         if fault is not None:
             found.append(fault)
@@ -168,14 +169,9 @@ def _numbers(words: list[str], count: int) -> tuple[float, ...] | None:
     if not words or words[0] != OK or len(words) != 1 + count:
         return None
     try:
-        return tuple(map(_number, words[1:]))
+        return tuple(map(suite.number, words[1:]))
     except (ValueError, OverflowError):
         return None
-
-
-def _number(word: str) -> float:
-    """Return a number as C prints it, by %a or %g."""
-    return float.fromhex(word) if "x" in word.lower() else float(word)
 
 
 def _short(text: str, most: int = 60) -> str:

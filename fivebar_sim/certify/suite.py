@@ -66,6 +66,16 @@ class Leg(NamedTuple):
         return " ".join(["leg", *self.numbers])
 
 
+def number(word: str) -> float:
+    """Return a number of an answer, hex or decimal: as C prints it, by %a or %g.
+
+    Raises:
+        ValueError: The word is no number.
+        OverflowError: A hex number beyond the largest one.
+    """
+    return float.fromhex(word) if "x" in word.lower() else float(word)
+
+
 def load(place: Path | None = None) -> list[Leg]:
     """Return the legs of a folder's files, sorted by name; None is the shipped folder.
 
