@@ -31,9 +31,11 @@ from fivebar_sim.simulation import feedback, steps
 from fivebar_sim.walking.shown import live as live_robots
 from fivebar_sim.walking.shown import recording
 
+PD = "controller={name='pd', period=0.002}"
 RUNS = {
     "setpoints": ("classic-ellipse", ["duration=0.9"]),
-    "feedback": ("classic-ellipse", ["duration=0.9", "controller={name='pd', period=0.002}"]),
+    # Every fourth period is sent by itself, so a short run is many messages.
+    "feedback": ("classic-ellipse", ["duration=0.4", "path.ramp=0.1", "path.frequency=4", PD]),
     "ground": ("treadmill-trot", ["duration=0.9"]),
 }
 
@@ -88,7 +90,7 @@ def test_what_is_sent_is_what_was_simulated(name: str, kept: Path) -> None:
 STAND = ["duration=0.1", "path.seconds=0.1", "path.ramp=0.05", "limits={}"]
 ROBOTS = {
     "feedback": [
-        "controller={name='pd', period=0.002}",
+        "controller={name='pd', period=0.004}",
         'robot.hips.side_step={kp=4, kd=0.03, mass="20 g", across=0, along=0}',
     ],
     "held": ["scene='air'"],
