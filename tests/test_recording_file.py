@@ -13,6 +13,7 @@ from recorded import digest
 
 from fivebar_sim import rollout
 from fivebar_sim.errors import ConfigError, RunDirectoryError
+from fivebar_sim.recording import check
 from fivebar_sim.recording.check import read_through
 from fivebar_sim.runs import recording_file
 from fivebar_sim.scenario import Scenario
@@ -83,6 +84,16 @@ def test_one_that_cannot_be_read_is_rebuilt(
     assert digest(own) == content
     assert own.stat().st_mode & 0o777 == 0o644
     assert set(os.listdir(run)) == names
+
+
+def test_damage_is_found_without_all_of_rerun(
+    run: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its import takes longer than to find the damage."""
+    (tmp_path / "rerun.py").write_text("import os; os._exit(0)", encoding="utf-8")
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    DAMAGES["torn"](run / "recording.rrd")
+    assert not check.reads(run / "recording.rrd")
 
 
 def test_the_recording_of_another_run_is_rebuilt(run: Path, content: str) -> None:
