@@ -150,5 +150,5 @@ def light(monkeypatch: pytest.MonkeyPatch) -> None:
     Where the directory goes is what is asked.
     """
     write = "fivebar_sim.recording.rrd.write"
-    monkeypatch.setattr(write, lambda path, runs, labels: path.write_bytes(b"RRF2"))
+    monkeypatch.setattr(write, lambda path, *run: path.write_bytes(b"RRF2"))
     monkeypatch.setattr(coarse, "warnings", lambda result, again: [])

@@ -123,5 +123,5 @@ def unrecorded() -> Iterator[None]:
     """Write no more of a Rerun recording than its first bytes: a report does not read it."""
     with pytest.MonkeyPatch.context() as patch:
         write = "fivebar_sim.recording.rrd.write"
-        patch.setattr(write, lambda path, runs, labels: path.write_bytes(b"RRF2"))
+        patch.setattr(write, lambda path, *run: path.write_bytes(b"RRF2"))
         yield

@@ -48,7 +48,7 @@ def started(command: Sequence[str], interrupt: Any = None, **more: Any) -> subpr
 LIGHT = """
 import sys, types
 rrd = types.ModuleType("fivebar_sim.recording.rrd")
-rrd.write = lambda path, runs, labels: path.write_bytes(b"RRF2")
+rrd.write = lambda path, *run: path.write_bytes(b"RRF2")
 sys.modules[rrd.__name__] = rrd
 """
 """Before a program: it writes no recording but its first bytes, and does not import Rerun."""

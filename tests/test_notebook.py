@@ -262,7 +262,7 @@ def test_replay_is_below_the_cell_where_a_notebook_can_show_it(
         chunks += [c for each in reader.store_entries() for c in reader.stream(store=each)]
     (whose,) = [c for c in chunks if c.entity_path == f"/__properties/{PROPERTY}"]
     told = whose.to_record_batch()["sha256"].to_pylist()[0][0]
-    assert told == identity(result.scenario, result.record, result.measured)
+    assert told == identity(result)
 
 
 @pytest.mark.parametrize("installed", [True, False])

@@ -48,7 +48,7 @@ def test_many_writers_of_one_place_all_end_well(
     tmp_path: Path, results: list[Result], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Without a recording they meet the more often: it takes most of the time."""
-    monkeypatch.setattr(rrd, "write", lambda path, runs, labels: path.write_bytes(b"RRF2"))
+    monkeypatch.setattr(rrd, "write", lambda path, *run: path.write_bytes(b"RRF2"))
     place = tmp_path / "mine"
     errors = list[BaseException]()
 

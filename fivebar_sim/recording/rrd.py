@@ -19,6 +19,7 @@ import numpy as np
 from fivebar_sim.arrays import Array
 from fivebar_sim.errors import FiveBarError
 from fivebar_sim.files import file_stream
+from fivebar_sim.geometry import FiveBar
 from fivebar_sim.metrics.columns import Record
 from fivebar_sim.recording import foot, ground, layout
 from fivebar_sim.recording import leg as scene
@@ -55,7 +56,9 @@ class RerunDisabledError(FiveBarError, RuntimeError):
     """Rerun is switched off by the environment."""
 
 
-def write(path: Path, runs: Sequence[Run], labels: Sequence[str] = ()) -> None:
+def write(
+    path: Path, runs: Sequence[Run], labels: Sequence[str] = (), identities: Sequence[str] = ()
+) -> None:
     """Write the recording of one or more runs to a .rrd file; several are drawn over each other.
 
     Timelines: `sim_time` (the record's time, to the nanosecond) and `step` (from 1: t = step h).
@@ -66,6 +69,7 @@ def write(path: Path, runs: Sequence[Run], labels: Sequence[str] = ()) -> None:
         runs: The runs to draw, at least one. Each of several has its own colour, and its entities
             are under run_1, run_2, ...
         labels: Names of the runs, all different; by default the names of their scenarios.
+        identities: What identifies each run, see `identity`; by default it is computed.
 
     Raises:
         OSError: The file cannot be written.
@@ -73,7 +77,7 @@ def write(path: Path, runs: Sequence[Run], labels: Sequence[str] = ()) -> None:
     """
     names = list(labels) or [run.scenario.name for run in runs]
     with file_of(path, names) as stream:
-        send(stream, runs, names)
+        send(stream, runs, names, identities)
 
 
 @contextmanager
@@ -129,8 +133,13 @@ def _load() -> None:
             del os.environ["RUST_LOG"]
 
 
-def send(stream: rr.RecordingStream, runs: Sequence[Run], names: list[str]) -> None:
-    """Send the layout, the text, the floor and all runs, each with its name."""
+def send(
+    stream: rr.RecordingStream,
+    runs: Sequence[Run],
+    names: list[str],
+    identities: Sequence[str] = (),
+) -> None:
+    """Send the layout, the text, the floor and all runs, each with its name; see `write`."""
     import rerun as rr
 
     shown = looks(names)
@@ -147,7 +156,9 @@ def send(stream: rr.RecordingStream, runs: Sequence[Run], names: list[str]) -> N
     stream.log(layout.SUMMARY, rr.TextDocument(text, media_type="text/markdown"), static=True)
     log_room(stream, room)
 
-    for run, look, poses in zip(runs, shown, moved, strict=True):
+    known = identities or [identity(run) for run in runs]
+    for run, own, look, poses in zip(runs, known, shown, moved, strict=True):
+        log_origin(stream, run.scenario.leg, own, look)
         _send_run(stream, run, look, poses, room)
 
 
@@ -183,6 +194,15 @@ def log_room(stream: rr.RecordingStream, room: Room) -> None:
         ground.log_floor(stream, room)
 
 
+def log_origin(stream: rr.RecordingStream, leg: FiveBar, own: str, look: Look) -> None:
+    """Log a run's leg in numbers, and what identifies the run."""
+    import rerun as rr
+
+    # As JSON, since a plain value keeps the type that it first had.
+    stream.send_property(f"{look.root}leg", rr.AnyValues(json=json.dumps(asdict(leg))))
+    stream.send_property(f"{look.root}{PROPERTY}", rr.AnyValues(sha256=own))
+
+
 def _send_run(
     stream: rr.RecordingStream,
     run: Run,
@@ -190,17 +210,11 @@ def _send_run(
     moved: DrawnMotion,
     room: Room,
 ) -> None:
-    """Send one run: the leg's numbers and its motion, the foot, the ground, the plots."""
-    import rerun as rr
-
+    """Send one run: the leg's motion, the foot, the ground, the plots."""
     leg = run.scenario.leg
     time = run.record["time"]
     rows = drawn_rows(time)
     drawn = times(time[rows], rows + 1)
-    # As JSON, since a plain value keeps the type that it first had.
-    stream.send_property(f"{look.root}leg", rr.AnyValues(json=json.dumps(asdict(leg))))
-    own = identity(run.scenario, run.record, run.measured)
-    stream.send_property(f"{look.root}{PROPERTY}", rr.AnyValues(sha256=own))
     scene.log_leg(stream, leg, look)
     scene.send_leg(stream, leg, moved, look, drawn)
     foot.log_foot(stream, points(run.record, "target"), look)

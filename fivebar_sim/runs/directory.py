@@ -24,6 +24,7 @@ from fivebar_sim.runs import checksums, described, recorded
 from fivebar_sim.runs.anew import beside
 from fivebar_sim.runs.kept import DIVERGED, FILES, keep, own_names
 from fivebar_sim.scenario.run import Run
+from fivebar_sim.simulation.provenance import identity
 
 RECORDING = "recording.rrd"
 SCENARIO = "scenario.toml"
@@ -189,8 +190,9 @@ def _fill(stage: Path, result: Run) -> None:
     (stage / "metrics.json").write_text(text + "\n", encoding="utf-8")
     # Last of these: it has the checksums of the others.
     others = ["scenario.toml", "metrics.json", *scenario.files]
-    write_record(stage, result.record, others, beside.written(result.measured))
-    recorded.write(stage / RECORDING, [result])
+    checksum = write_record(stage, result.record, others, beside.written(result.measured))
+    # A checksum takes as long as the rest of the record's file: it is computed once.
+    recorded.write(stage / RECORDING, [result], identities=[identity(result, checksum)])
 
 
 def write_record(
@@ -198,10 +200,11 @@ def write_record(
     record: Mapping[str, Array],
     others: Iterable[str],
     more: Mapping[bytes, bytes] | None = None,
-) -> None:
+) -> str:
     """Write the record as Parquet, one column each, with units, and checksums that show damage.
 
     Byte by byte, as all signs and exponents are alike: a third of the size, in a third of the time.
+    Returns the record's own checksum.
 
     Args:
         folder: The run directory.
@@ -212,7 +215,8 @@ def write_record(
     import pyarrow
     import pyarrow.parquet
 
-    sums = checksums.of_files(folder, others) | {checksums.RECORD: digest(record)}
+    checksum = digest(record)
+    sums = checksums.of_files(folder, others) | {checksums.RECORD: checksum}
     said = described.metadata(record)
     fields = [pyarrow.field(name, pyarrow.float64(), metadata=said.get(name)) for name in record]
     schema = pyarrow.schema(fields, metadata={**checksums.written(sums), **(more or {})})
@@ -228,6 +232,7 @@ def write_record(
             use_byte_stream_split=True,
             write_page_checksum=True,
         )
+    return checksum
 
 
 def _exchange(stage: Path, path: Path) -> None:

@@ -16,7 +16,9 @@ if TYPE_CHECKING:
     import rerun as rr
 
 
-def write(path: Path, runs: Sequence[Run], labels: Sequence[str] = ()) -> None:
+def write(
+    path: Path, runs: Sequence[Run], labels: Sequence[str] = (), identities: Sequence[str] = ()
+) -> None:
     """Write the recording of one or more runs; see `rrd.write`.
 
     Raises:
@@ -25,9 +27,9 @@ def write(path: Path, runs: Sequence[Run], labels: Sequence[str] = ()) -> None:
         RerunDisabledError: The environment variable RERUN switches Rerun off.
     """
     if all_of_robots(runs):
-        robots.write(path, runs, labels)
+        robots.write(path, runs, labels, identities)
     else:
-        rrd.write(path, runs, labels)
+        rrd.write(path, runs, labels, identities)
 
 
 def send(stream: rr.RecordingStream, runs: Sequence[Run], labels: Sequence[str] = ()) -> None:

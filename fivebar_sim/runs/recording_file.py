@@ -62,7 +62,8 @@ def labels_of(paths: Sequence[Path]) -> list[str]:
 def _own(run: stored.StoredRun, folder: Path) -> Path:
     """Return a readable recording of one run: its own, or a new one in the folder."""
     own = run.path / RECORDING
-    if is_readable(own, identity(run.scenario, run.record, run.measured)):
+    whose = identity(run)
+    if is_readable(own, whose):
         return own
 
     try:
@@ -70,14 +71,14 @@ def _own(run: stored.StoredRun, folder: Path) -> Path:
     except OSError:
         # The run lies where the user may not write: the recording then lasts as long as its viewer.
         file = folder / RECORDING
-        recorded.write(file, [run])
+        recorded.write(file, [run], identities=[whose])
         return file
 
     # Written beside and renamed, so that an interrupt never leaves half a recording.
     os.close(handle)
     beside = Path(name)
     try:
-        recorded.write(beside, [run])
+        recorded.write(beside, [run], identities=[whose])
         beside.chmod(0o644)
         beside.replace(own)
     finally:

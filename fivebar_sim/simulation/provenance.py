@@ -11,9 +11,9 @@ from importlib.metadata import version
 from typing import Any
 
 from fivebar_sim.files import resources
-from fivebar_sim.metrics.columns import Record, digest
-from fivebar_sim.metrics.measured import Judged
+from fivebar_sim.metrics.columns import digest
 from fivebar_sim.scenario import Scenario
+from fivebar_sim.scenario.run import Run
 
 
 def provenance(scenario: Scenario) -> dict[str, Any]:
@@ -29,9 +29,15 @@ def provenance(scenario: Scenario) -> dict[str, Any]:
     }
 
 
-def identity(scenario: Scenario, record: Record, measured: Judged) -> str:
-    """Return what identifies a run: a checksum of all that a recording shows of it."""
-    said = json.dumps([scenario.table(), measured.table, digest(record)])
+def identity(run: Run, checksum: str = "") -> str:
+    """Return what identifies a run: a checksum of all that a recording shows of it.
+
+    Args:
+        run: The run.
+        checksum: That of its record, see `digest`; by default it is computed.
+    """
+    parts = [run.scenario.table(), run.measured.table, checksum or digest(run.record)]
+    said = json.dumps(parts)
     return hashlib.sha256(said.encode()).hexdigest()
 
 

@@ -5,9 +5,7 @@ Rerun is slow to import: only the functions that use it do.
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -17,7 +15,6 @@ from fivebar_sim.arrays import Array
 from fivebar_sim.metrics.columns import Record
 from fivebar_sim.recording import foot, layout, rrd
 from fivebar_sim.recording import leg as legs
-from fivebar_sim.recording.check import PROPERTY
 from fivebar_sim.recording.look import GREY, Colour, Look, looks, shade
 from fivebar_sim.recording.plots import Series
 from fivebar_sim.recording.poses import Room, Rows, drawn_motion, drawn_rows, points
@@ -59,15 +56,22 @@ class Drawn(NamedTuple):
     times: list[rr.TimeColumn]
 
 
-def write(path: Path, runs: Sequence[Run], labels: Sequence[str] = ()) -> None:
+def write(
+    path: Path, runs: Sequence[Run], labels: Sequence[str] = (), identities: Sequence[str] = ()
+) -> None:
     """Write the recording of one or more robots' runs to a .rrd file; see `rrd.write`."""
     names = list(labels) or [run.scenario.name for run in runs]
     with rrd.file_of(path, names) as stream:
-        send(stream, runs, names)
+        send(stream, runs, names, identities)
 
 
-def send(stream: rr.RecordingStream, runs: Sequence[Run], names: list[str]) -> None:
-    """Send the layout, the text, the floor and all runs, each with its name."""
+def send(
+    stream: rr.RecordingStream,
+    runs: Sequence[Run],
+    names: list[str],
+    identities: Sequence[str] = (),
+) -> None:
+    """Send the layout, the text, the floor and all runs, each with its name; see `rrd.write`."""
     import rerun as rr
 
     shown = looks(names)
@@ -85,9 +89,11 @@ def send(stream: rr.RecordingStream, runs: Sequence[Run], names: list[str]) -> N
     uneven = [isinstance(scene, Floor) and not scene.ground.level for scene in grounds]
     # A floor that no run is on would hide the ground of those that there are.
     rrd.log_room(stream, room._replace(floor=room.floor and not all(uneven)))
-    for run, look, own in zip(runs, shown, plots, strict=True):
+    known = identities or [identity(run) for run in runs]
+    for run, own, look, lines in zip(runs, known, shown, plots, strict=True):
+        rrd.log_origin(stream, _robot(run).leg, own, look)
         _send_run(stream, run, look, room)
-        rrd.send_plots(stream, own, look, run.record["time"])
+        rrd.send_plots(stream, lines, look, run.record["time"])
 
 
 def _robot(run: Run) -> Robot:
@@ -96,16 +102,9 @@ def _robot(run: Run) -> Robot:
 
 
 def _send_run(stream: rr.RecordingStream, run: Run, look: Look, room: Room) -> None:
-    """Send one run: the robot's numbers, what stands still, and what moves."""
-    import rerun as rr
-
+    """Send one run: what stands still, and what moves."""
     robot = _robot(run)
     rows = drawn_rows(run.record["time"])
-    # As JSON, since a plain value keeps the type that it first had.
-    stream.send_property(f"{look.root}leg", rr.AnyValues(json=json.dumps(asdict(robot.leg))))
-    own = identity(run.scenario, run.record, run.measured)
-    stream.send_property(f"{look.root}{PROPERTY}", rr.AnyValues(sha256=own))
-
     targets = {leg: points(of_leg(run.record, leg), "target")[rows] for leg in LEGS}
     scene = run.scenario.scene
     if isinstance(scene, Floor) and not scene.ground.level:
