@@ -111,6 +111,46 @@ def test_geoms_of_a_leg_that_collide_are_kept() -> None:
     assert lean.can_touch(built)
 
 
+def test_geoms_that_are_only_seen_have_no_part_in_the_search_for_contacts() -> None:
+    built = model.build(CLASSIC, scene="rail")
+    names = {built.geom(i).name for i in np.flatnonzero(lean.only_seen(built))}
+    assert names == {"trunk", "L1", "L2", "L3", "L4", "L5"}
+    (short,) = lean.lean([built])
+    drawn = [short.geom(name).bodyid.item() for name in sorted(names)]
+    assert drawn == [0] * len(names)
+    assert short.geom("foot").bodyid == short.body("L2").id
+    assert built.geom("L3").bodyid == built.body("L3").id
+
+
+def test_geom_that_acts_is_not_only_seen() -> None:
+    """It collides, in general or with one other, winds a tendon, or meets air."""
+    wound = (
+        '<worldbody><site name="a" pos="1 0 0"/><site name="b" pos="-1 0 0"/>'
+        '<geom name="drawn" size="0.1" contype="0" conaffinity="0"/>'
+        '<geom name="spool" size="0.1" contype="0" conaffinity="0"/>'
+        '<body name="ball" pos="0 0 1"><freejoint/>'
+        '<geom name="ball" size="0.1" contype="0" conaffinity="0"/></body></worldbody>'
+        '<contact><pair geom1="ball" geom2="drawn"/></contact>'
+        '<tendon><spatial><site site="a"/><geom geom="spool"/><site site="b"/></spatial></tendon>'
+    )
+    for left, xml in {
+        0: wound,
+        1: wound.replace('<geom geom="spool"/>', ""),
+        2: wound.replace('<pair geom1="ball" geom2="drawn"/>', ""),
+    }.items():
+        built = mujoco.MjModel.from_xml_string(f"<mujoco>{xml}</mujoco>")
+        assert lean.only_seen(built).sum() == left
+
+    leg = model.build(CLASSIC)
+    for name in ("contype", "conaffinity"):
+        getattr(leg.geom("L3"), name)[:] = 1
+        assert not lean.only_seen(leg)[leg.geom("L3").id]
+        getattr(leg.geom("L3"), name)[:] = 0
+        assert lean.only_seen(leg)[leg.geom("L3").id]
+    leg.opt.density = 1.2
+    assert not lean.only_seen(leg).any()
+
+
 def test_equal_models_are_one_and_others_are_not() -> None:
     """Whether they follow each other or not."""
     built = [model.build(CLASSIC) for _ in range(4)]

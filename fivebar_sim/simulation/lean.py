@@ -23,6 +23,9 @@ from fivebar_sim.model import friction_law
 RECORDED = "ground"
 """The sensor that is recorded; those of a robot end with it, after the leg's name."""
 
+WRAPPED = (mujoco.mjtWrap.mjWRAP_SPHERE.value, mujoco.mjtWrap.mjWRAP_CYLINDER.value)
+"""What a tendon may be wound round."""
+
 UPRIGHT = (1.0, 0.0, 0.0, 0.0)
 """The quaternion of what is not turned."""
 
@@ -34,7 +37,8 @@ _stopped: list[int | None] = []
 def lean(models: Sequence[mujoco.MjModel], *, forces: bool = True) -> list[mujoco.MjModel]:
     """Return copies that are stepped faster, to the same states: one for all models that are equal.
 
-    See `left_out`. Sensors that are not recorded stay at zero.
+    See `left_out`. Sensors that are not recorded stay at zero, and geoms that are only seen at the
+    world's origin.
 
     Args:
         models: The models.
@@ -70,8 +74,14 @@ def _saved(model: mujoco.MjModel) -> bytes:
 
 def _short(model: mujoco.MjModel, *, forces: bool) -> mujoco.MjModel:
     short = copy.copy(model)
-    short.opt.disableflags |= left_out(model, forces=forces)
-    short.sensor_needstage[~_recorded(model)] = mujoco.mjtStage.mjSTAGE_NONE.value
+    flags = left_out(model, forces=forces)
+    short.opt.disableflags |= flags
+    if not flags & mujoco.mjtDisableBit.mjDSBL_SENSOR.value:
+        short.sensor_needstage[~_recorded(model)] = mujoco.mjtStage.mjSTAGE_NONE.value
+    # The search for contacts begins with the axes along which all geoms of moving bodies lie.
+    seen = only_seen(model)
+    short.geom_bodyid[seen] = 0
+    short.geom_sameframe[seen] = mujoco.mjtSameFrame.mjSAMEFRAME_BODY.value
     return short
 
 
@@ -98,10 +108,27 @@ def left_out(model: mujoco.MjModel, *, forces: bool = True) -> int:
     return sum(flag.value for flag in chosen)
 
 
+def only_seen(model: mujoco.MjModel) -> Bools:
+    """Return which geoms neither collide, nor push on air or water, nor wind a tendon, (ngeom,)."""
+    if model.opt.density or model.opt.viscosity:
+        return np.zeros(model.ngeom, dtype=bool)
+    seen = (model.geom_contype | model.geom_conaffinity) == 0
+    seen[model.pair_geom1] = False
+    seen[model.pair_geom2] = False
+    wound = [kind in WRAPPED for kind in model.wrap_type.tolist()]
+    seen[model.wrap_objid[wound]] = False
+    return seen
+
+
 def _recorded(model: mujoco.MjModel) -> Bools:
     """Return which sensors are recorded, (nsensor,)."""
-    names = [model.sensor(i).name for i in range(model.nsensor)]
+    names = [_name(model, i) for i in range(model.nsensor)]
     return np.array([name.split("_")[-1] == RECORDED for name in names], dtype=bool)
+
+
+def _name(model: mujoco.MjModel, i: int) -> str:
+    """Return the name of a sensor; `model.sensor` would look up all that the model has."""
+    return mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_SENSOR, i) or ""
 
 
 def recorded_columns(model: mujoco.MjModel) -> list[int]:
@@ -114,7 +141,7 @@ def recorded_columns(model: mujoco.MjModel) -> list[int]:
     for i in np.flatnonzero(_recorded(model)):
         # Before the force is a number that says whether there is any.
         start = int(model.sensor_adr[i]) + 1
-        alone = model.sensor(i).name == RECORDED
+        alone = _name(model, int(i)) == RECORDED
         stop = int(model.sensor_adr[i] + model.sensor_dim[i])
         columns += [start, start + 2] if alone else range(start, stop)
     return columns

@@ -105,7 +105,8 @@ class Legs:
         if qpos.ndim != 2 or qpos.shape[1] != first.nq:
             raise ArgumentError(f"qpos must have shape (nsim, {first.nq}), got {qpos.shape}")
         everyone = stepped * len(qpos) if shared else stepped
-        self._gears = Gears.of(everyone, recorded_columns(first))
+        self._ground = recorded_columns(first)
+        self._gears = Gears.of(everyone, self._ground)
         self._batch = Batch(first, len(qpos), nthread)
         if self._gears is not None:
             spread(self._batch, everyone)
@@ -118,7 +119,6 @@ class Legs:
         single = len(qpos) == 1 and not self.whole
         self._alone = self._single(first) if single else None
         self._sizes = first.nq, first.nv, first.nu
-        self._ground = recorded_columns(first)
 
     def _single(self, model: mujoco.MjModel) -> Alone:
         """Return the one simulation that there is."""
