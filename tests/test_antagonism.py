@@ -7,7 +7,7 @@ import pytest
 
 from fivebar_sim import dynamics, kinematics
 from fivebar_sim.dynamics import antagonism
-from fivebar_sim.errors import UnreachableError
+from fivebar_sim.errors import FiveBarError, UnreachableError
 from fivebar_sim.geometry import FiveBar
 from fivebar_sim.kinematics.two_link import SerialLeg
 from fivebar_sim.metrics import load
@@ -50,6 +50,13 @@ def test_what_no_serial_leg_does_has_no_price(rng: np.random.Generator) -> None:
     assert still.heat is not None
     assert (still.friction, still.turning) == (None, None)
     assert antagonism.price(CLASSIC, theta, omega, 0.0 * torque).heat is None
+
+
+def test_a_foot_in_the_serial_legs_hip_is_refused() -> None:
+    """Any knee fits."""
+    none = np.zeros(1)
+    with pytest.raises(FiveBarError, match="hip"):
+        antagonism._tibia(SerialLeg(0.05, 0.05), (none, none))
 
 
 def test_a_foot_out_of_the_serial_legs_reach_is_not_compared() -> None:

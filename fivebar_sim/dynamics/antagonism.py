@@ -18,10 +18,10 @@ import numpy as np
 from fivebar_sim import kinematics
 from fivebar_sim.arrays import Array, blocks
 from fivebar_sim.dynamics.chain import Chain
-from fivebar_sim.dynamics.plane import placed
+from fivebar_sim.dynamics.plane import Vector, cross, dot, placed, split
 from fivebar_sim.errors import FiveBarError
 from fivebar_sim.geometry import FiveBar
-from fivebar_sim.kinematics.planar import cross, dot, perp
+from fivebar_sim.kinematics.reach import reaches
 from fivebar_sim.kinematics.two_link import SerialLeg
 
 
@@ -59,49 +59,73 @@ def price(leg: FiveBar, theta: Array, omega: Array, torque: Array) -> Price:
     """
     serial = serial_leg(leg)
     chain = Chain.of(leg, None, 0.0)
-    tau_s = np.empty_like(torque)
-    omega_s = np.empty_like(omega)
+    own = np.zeros(3)
+    other = np.zeros(3)
     for rows in blocks(len(theta)):
-        tau_s[rows], omega_s[rows] = _serial(serial, chain, theta[rows], omega[rows], torque[rows])
+        tau = split(torque[rows])
+        w = split(omega[rows])
+        own += _needs(tau, w)
+        other += _needs(*_serial(serial, chain, split(theta[rows]), w, tau))
 
-    return Price(
-        heat=_ratio(torque**2, tau_s**2),
-        friction=_ratio(np.abs(torque * omega), np.abs(tau_s * omega_s)),
-        turning=_ratio(np.abs(omega), np.abs(omega_s)),
-    )
+    ratios = zip(own.tolist(), other.tolist(), strict=True)
+    return Price(*(needs / most if most > 0.0 else None for needs, most in ratios))
+
+
+def _needs(tau: Vector, w: Vector) -> Array:
+    """Return the sums of tau^2, |tau omega| and |omega| of both motors, (3,)."""
+    sums = [
+        [np.dot(t, t), np.abs(t * rate).sum(), np.abs(rate).sum()]
+        for t, rate in zip(tau, w, strict=True)
+    ]
+    return np.sum(sums, axis=0)
 
 
 def _serial(
-    serial: SerialLeg, chain: Chain, theta: Array, omega: Array, torque: Array
-) -> tuple[Array, Array]:
-    """Return the serial leg's torques and rates, (N, 2); see `price`."""
+    serial: SerialLeg, chain: Chain, theta: Vector, w: Vector, tau: Vector
+) -> tuple[Vector, Vector]:
+    """Return the torques and the rates of the serial leg's hip and knee; see `price`.
+
+    J's columns are perp(AB) + a2 perp(BF) and b2 perp(BF), S's perp(OF) and perp(KF), K the knee.
+    """
     leg = chain.leg
-    pose = chain.pose(theta[:, 0], theta[:, 1])
-    AB = np.stack(pose.e1, axis=-1) * leg.L1
-    BF = np.stack(placed(pose.e2, leg.foot_offset), axis=-1)
-    by_A = perp(AB) + pose.a2[:, None] * perp(BF)
-    by_E = pose.b2[:, None] * perp(BF)
-    # J^T f = tau, so that J's columns are the rows.
-    force = _solved(by_A, by_E, torque)
-    S = serial.jacobian(serial.inverse(kinematics.bases(leg)[0] + AB + BF))
-    hip = S[..., 0]
-    knee = S[..., 1]
-    tau_s = np.stack([dot(hip, force), dot(knee, force)], axis=-1)
-    speed = by_A * omega[:, :1] + by_E * omega[:, 1:]
-    return tau_s, _solved(S[:, 0], S[:, 1], speed)
-
-
-def _solved(first: Array, second: Array, right: Array) -> Array:
-    """Return x of first . x = right_1 and second . x = right_2, (N, 2)."""
-    # By Cramer's rule, in a tenth of the time that LAPACK takes for so small matrices.
-    det = cross(first, second)
-    if not det.all():
+    pose = chain.pose(*theta)
+    AB = leg.L1 * pose.e1[0], leg.L1 * pose.e1[1]
+    BF = placed(pose.e2, leg.foot_offset)
+    A = kinematics.bases(leg)[0].tolist()
+    OF = A[0] + AB[0] + BF[0], A[1] + AB[1] + BF[1]
+    KF = _tibia(serial, OF)
+    det = cross(AB, BF)
+    det_s = cross(OF, KF)
+    if not (det.all() and pose.b2.all() and det_s.all()):
         raise FiveBarError("a pose of the window is singular")
-    x = right[:, 0] * second[:, 1] - right[:, 1] * first[:, 1]
-    z = first[:, 0] * right[:, 1] - second[:, 0] * right[:, 0]
-    return np.stack([x / det, z / det], axis=-1)
+
+    # J^T f = tau are the torques of f about A and B, and J omega turns L1 and L2.
+    about_B = tau[1] / pose.b2
+    about_A = (tau[0] - pose.a2 * about_B) / det
+    about_B /= det
+    f = about_A * BF[0] - about_B * AB[0], about_A * BF[1] - about_B * AB[1]
+    w2 = pose.a2 * w[0] + pose.b2 * w[1]
+    # perp(v): the velocity of F, turned back by a quarter.
+    v = AB[0] * w[0] + BF[0] * w2, AB[1] * w[0] + BF[1] * w2
+    rates = cross(v, KF) / det_s, cross(OF, v) / det_s
+    return (cross(OF, f), cross(KF, f)), rates
 
 
-def _ratio(own: Array, other: Array) -> float | None:
-    most = float(other.sum())
-    return float(own.sum()) / most if most > 0.0 else None
+def _tibia(serial: SerialLeg, OF: Vector) -> Vector:
+    """Return the vector from the serial leg's knee to its foot, for the vector from its hip.
+
+    The law of cosines as in `kinematics.reach.side_angle`, without the angle.
+    """
+    x, z = OF
+    d2 = dot(OF, OF)
+    if not d2.all():
+        raise FiveBarError("the foot is in the serial leg's hip in a pose of the window")
+    if not reaches(d2, serial.L1, serial.L2).all():
+        # Says which point, and how far it may be.
+        serial.inverse(np.stack(OF, axis=-1))
+    longer = serial.L1 + serial.L2
+    shorter = serial.L1 - serial.L2
+    along = 0.5 - 0.5 * shorter * longer / d2
+    root = np.sqrt(np.maximum((longer**2 - d2) * (d2 - shorter**2), 0.0))
+    across = 0.5 * serial.knee * root / d2
+    return along * x + across * z, along * z - across * x
