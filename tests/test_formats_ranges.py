@@ -38,4 +38,5 @@ def test_ranges_of_joints_are_named_with_every_digit(file: str, count: int) -> N
         np.testing.assert_allclose(
             np.sort(wrap(np.array(read))), np.sort(wrap(np.array([low, high]))), rtol=0, atol=1e-12
         )
-    assert all(f"#   {each}" in preset.text(seen) for each in preset.notes(seen))
+    text = preset.text(seen)
+    assert all(f"#   {each}" in text for each in preset.notes(seen))

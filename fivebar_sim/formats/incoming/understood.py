@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -62,8 +63,7 @@ class Understood:
             k: 0 for A, 1 for B, 3 for D, 4 for E.
         """
         model = self.source.model
-        pose = self.source.poses[0]
-        posed = Posed(self.source, self.loop, pose)
+        posed, angles = self._first
         joint = self.loop.hinges[k]
         ground = posed.ground()
 
@@ -72,10 +72,16 @@ class Understood:
         # A joint of the inner link's own body turns the inner link against the outer one.
         if int(model.jnt_bodyid[joint]) not in self.loop.links[OUTER[k]]:
             sign = -sign
-        theta = float(self.angles(pose)[ANGLE[k]])
-        q = float(pose[model.jnt_qposadr[joint]])
+        theta = float(angles[ANGLE[k]])
+        q = float(posed.data.qpos[model.jnt_qposadr[joint]])
         offset = float(wrap(np.array(theta - sign * q)))
         return sign, offset if abs(offset) > NOTHING else 0.0
+
+    @cached_property
+    def _first(self) -> tuple[Posed, Array]:
+        """The source in its first pose, and the leg's angles there [rad], (4,)."""
+        pose = self.source.poses[0]
+        return Posed(self.source, self.loop, pose), self.angles(pose)
 
     @property
     def ground(self) -> int:
