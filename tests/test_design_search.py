@@ -200,7 +200,7 @@ run.search(design.load(sys.argv[1]), Path(sys.argv[2]), watch=watch)
 
 def test_killed_search_goes_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(methods, "BLOCK", 64)
-    task = load(tmp_path, TWO + 'method = "sobol"\ndesigns = 400')
+    task = load(tmp_path, TWO + 'method = "grid"\npoints = 20')
     command = [sys.executable, "-c", KILLED, task.where, str(tmp_path / "killed")]
     ended = subprocess.run(command, check=False, env={**os.environ, "OMP_NUM_THREADS": "1"})
     assert ended.returncode == -signal.SIGKILL
