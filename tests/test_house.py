@@ -6,10 +6,11 @@ import ast
 import gc
 import importlib
 import importlib.util
+import os
 import subprocess
 import sys
 import warnings
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 
@@ -68,6 +69,11 @@ PURE = (
     "tasks.episodes",
 )
 HEAVY = {"mujoco", "rerun", "matplotlib", "scipy"}
+
+ASKED = ("fivebar_sim.environment", "fivebar_sim.rollout", "fivebar_sim.cli.program")
+"""What imports MuJoCo, and packages of extras only where someone asks for them."""
+
+EXTRA = {"gymnasium", "dm_control", "dm_env", "warp", "mujoco_warp", "torch"}
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -184,25 +190,52 @@ def test_top_level_and_rooms_are_small() -> None:
     assert max(sizes.values()) <= house.MOST_IN_A_ROOM
 
 
-def loaded_by(modules: Sequence[str]) -> dict[str, set[str]]:
-    """Return what is loaded after each of some modules, imported in turn by one new process."""
-    code = """import importlib, sys
+IMPORTED = """import importlib, os, subprocess, sys
+subprocess.run = subprocess.Popen = None
+before = dict(os.environ)
 for module in sys.argv[1:]:
-    importlib.import_module(module)
-    print(module, *{each.split(".")[0] for each in sys.modules})"""
-    command = [sys.executable, "-W", "error", "-c", code, *modules]
-    run = subprocess.run(command, capture_output=True, text=True, check=True, cwd=ROOT)
+    loaded = importlib.import_module(module)
+    if module == "fivebar_sim.rollout":
+        loaded.run_all([])
+    assert dict(os.environ) == before
+    print(module, *sys.modules)
+"""
+
+
+@pytest.fixture(scope="module")
+def loaded() -> dict[str, set[str]]:
+    """Return what is loaded after each of some modules, imported in turn by one new process.
+
+    What one loads stays loaded for the next, so the first that is named is the one.
+    """
+    rooms = [f"fivebar_sim.{room}" for room in PURE]
+    command = [sys.executable, "-W", "error", "-c", IMPORTED, *rooms, *ASKED]
+    # MuJoCo itself would start a process, to look for a screen.
+    env = {**os.environ, "MUJOCO_GL": "disable"}
+    run = subprocess.run(command, capture_output=True, text=True, check=True, cwd=ROOT, env=env)
     rows = [line.split() for line in run.stdout.splitlines()]
-    return {module: set(loaded) for module, *loaded in rows}
+    assert [module for module, *_ in rows] == [*rooms, *ASKED]
+    return {module: set(names) for module, *names in rows}
 
 
-def test_pure_rooms_import_nothing_heavy() -> None:
-    """What one room loads stays loaded for the next, so the first that is named is the one."""
-    loaded = loaded_by([f"fivebar_sim.{room}" for room in PURE])
-    assert len(loaded) == len(PURE)
-    for room, names in loaded.items():
-        assert "fivebar_sim" in names
-        assert not HEAVY & names, room
+def tops(modules: set[str]) -> set[str]:
+    """Return the top-level names of modules."""
+    return {module.split(".")[0] for module in modules}
+
+
+def test_pure_rooms_import_nothing_heavy(loaded: dict[str, set[str]]) -> None:
+    for room in PURE:
+        assert not HEAVY & tops(loaded[f"fivebar_sim.{room}"]), room
+
+
+def test_imports_start_and_set_nothing_and_bring_no_extra_along(
+    loaded: dict[str, set[str]],
+) -> None:
+    """Each would be an error where they are loaded: a process that is started, a variable set."""
+    for module in ASKED:
+        assert "mujoco" in loaded[module]
+        assert not EXTRA & tops(loaded[module]), module
+        assert "fivebar_sim.warp" not in loaded[module], module
 
 
 def test_only_what_has_an_extra_for_it_imports_scipy() -> None:
