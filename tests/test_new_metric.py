@@ -8,7 +8,7 @@ import re
 import shutil
 import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
@@ -29,26 +29,24 @@ ramp = 0.1
 [limits]
 tracking.percentile_95 = {limit}
 """
-Program = Callable[..., list[Said]]
+Program = Callable[[str], Said]
 COMMANDS = """
 import contextlib, io, json, sys
 from fivebar_sim import cli
 from fivebar_sim.report import single
 single.figures = lambda run: []  # what it draws says nothing of the metric
-came = []
-for command in json.loads(sys.argv[1]):
+for command in sys.stdin:
     out, err = io.StringIO(), io.StringIO()
     with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
         status = cli.main(command.split())
-    came.append([status, out.getvalue(), err.getvalue()])
-print(json.dumps(came))
+    print(json.dumps([status, out.getvalue(), err.getvalue()]), flush=True)
 """
-"""A program that calls several commands, since each would import everything anew."""
+"""A program that calls a command a line, since each by itself would import everything anew."""
 
 
 @pytest.fixture
-def fivebar(tmp_path: Path, quick_start: None) -> Program:
-    """Return what calls commands of a copy of the package that has the page's metric."""
+def fivebar(tmp_path: Path, quick_start: None) -> Iterator[Program]:
+    """Yield what calls commands of a copy of the package that has the page's metric."""
     # With its bytecode, which holds while a file keeps its time: else all of it is compiled.
     shutil.copytree(ROOT / "fivebar_sim", tmp_path / "fivebar_sim")
     for name in ("models", "scenarios", "controllers"):
@@ -63,20 +61,24 @@ def fivebar(tmp_path: Path, quick_start: None) -> Program:
     catalogue.write_text(f"{before}{begin}{row},\n{after}")
 
     path = os.pathsep.join([str(tmp_path), os.environ["PYTHONPATH"]])
+    with subprocess.Popen(
+        [sys.executable, "-c", COMMANDS],
+        cwd=tmp_path,
+        env={**os.environ, "PYTHONPATH": path, "COLUMNS": "80"},
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+    ) as process:
+        assert process.stdin
+        assert process.stdout
+        asked = process.stdin
+        said = process.stdout
 
-    def program(*commands: str) -> list[Said]:
-        done = subprocess.run(
-            [sys.executable, "-c", COMMANDS, json.dumps(commands)],
-            cwd=tmp_path,
-            env={**os.environ, "PYTHONPATH": path, "COLUMNS": "80"},
-            capture_output=True,
-            text=True,
-            check=False,
-        )
-        assert done.returncode == 0, done.stderr
-        return [Said(*each) for each in json.loads(done.stdout)]
+        def program(command: str) -> Said:
+            print(command, file=asked, flush=True)
+            return Said(*json.loads(said.readline()))
 
-    return program
+        yield program
 
 
 def test_a_row_and_a_function_are_all(fivebar: Program, tmp_path: Path) -> None:
@@ -84,9 +86,7 @@ def test_a_row_and_a_function_are_all(fivebar: Program, tmp_path: Path) -> None:
     scenario = tmp_path / "mine.toml"
     scenario.write_text(SCENARIO.format(limit=0.02))
 
-    ran, reported, checked = fivebar(
-        "run mine.toml --out run", "report run", "check mine.toml --update --junit junit.xml"
-    )
+    ran = fivebar("run mine.toml --out run")
     assert (ran.status, ran.err) == (0, "")
     assert re.search(rf"{LABEL} +[\d.]+ mm +<= 20 mm +pass", ran.out)
 
@@ -95,10 +95,10 @@ def test_a_row_and_a_function_are_all(fivebar: Program, tmp_path: Path) -> None:
     assert tracked["rms"] < tracked["percentile_95"] < tracked["max"]
     assert LABEL.encode() in (tmp_path / "run/recording.rrd").read_bytes()
 
-    assert reported.status == 0
+    assert fivebar("report run").status == 0
     assert LABEL in (tmp_path / "run/report.html").read_text()
 
-    assert checked.status == 0
+    assert fivebar("check mine.toml --update --junit junit.xml").status == 0
     assert f'name="{KEY}"' in (tmp_path / "junit.xml").read_text()
     baseline = tmp_path / "baselines/mine.json"
     recorded = json.loads(baseline.read_text())["metrics"][KEY]
@@ -107,7 +107,7 @@ def test_a_row_and_a_function_are_all(fivebar: Program, tmp_path: Path) -> None:
     # neither a broken limit nor a better value passes unseen
     (tmp_path / "strict.toml").write_text(SCENARIO.format(limit=1e-6))
     baseline.write_text(baseline.read_text().replace(str(recorded["value"]), "0.5"))
-    failed, better = fivebar("check strict.toml", "check mine.toml")
+    failed = fivebar("check strict.toml")
     assert failed.status == 1
     assert f"FAIL: mine: {LABEL}: " in failed.out
-    assert f"better than its baseline: {LABEL}" in better.out
+    assert f"better than its baseline: {LABEL}" in fivebar("check mine.toml").out
