@@ -14,7 +14,6 @@ from recorded import digest
 from fivebar_sim import rollout
 from fivebar_sim.errors import ConfigError, RunDirectoryError
 from fivebar_sim.recording import check
-from fivebar_sim.recording.check import read_through
 from fivebar_sim.runs import recording_file
 from fivebar_sim.scenario import Scenario
 
@@ -62,6 +61,20 @@ DAMAGES: dict[str, Callable[[Path], object]] = {
 }
 
 
+def reads_here(path: Path, run: str | None = None) -> bool:
+    """Return what `check.reads` returns, without a process: no damage here crashes the reader.
+
+    Args:
+        path: The recording.
+        run: What identifies the run whose recording it must be; None for any.
+    """
+    try:
+        found = check.read_through(path)
+    except (ValueError, RuntimeError):
+        return False
+    return run in (None, found)
+
+
 def test_a_good_recording_is_opened_as_it_is(run: Path) -> None:
     before = (run / "recording.rrd").stat().st_mtime_ns
     with recording_file.opened([run]) as file:
@@ -69,14 +82,16 @@ def test_a_good_recording_is_opened_as_it_is(run: Path) -> None:
     assert (run / "recording.rrd").stat().st_mtime_ns == before
 
 
-@pytest.mark.parametrize("damage", DAMAGES.values(), ids=DAMAGES)
+@pytest.mark.parametrize("name", DAMAGES)
 def test_one_that_cannot_be_read_is_rebuilt(
-    run: Path, content: str, damage: Callable[[Path], object]
+    run: Path, content: str, name: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Were it left as it is, its bytes would still be the damaged ones."""
+    if name != "torn":
+        monkeypatch.setattr(check, "reads", reads_here)
     own = run / "recording.rrd"
     names = set(os.listdir(run))
-    damage(own)
+    DAMAGES[name](own)
     damaged = own.read_bytes() if own.exists() else None
     with recording_file.opened([run]) as file:
         assert file == own
@@ -136,7 +151,7 @@ def test_several_are_one_temporary_file(run: Path) -> None:
     shutil.copytree(run, other)
     before = {path: path.stat().st_mtime_ns for path in run.parent.glob("*/*")}
     with recording_file.opened([run, other]) as file:
-        read_through(file)
+        check.read_through(file)
         assert file.is_relative_to(run.parent / "temporary")
     assert {path: path.stat().st_mtime_ns for path in run.parent.glob("*/*")} == before
     assert os.listdir(run.parent / "temporary") == []
