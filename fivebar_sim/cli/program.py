@@ -62,8 +62,11 @@ FEWEST = 40
 SAFE = "PYTHONSAFEPATH"
 """The variable with which Python imports nothing from the folder that it is started in."""
 
-SELDOM = 10_000
-"""New objects after which the garbage collector looks for what nobody needs any more."""
+SELDOM = 300_000
+"""New objects after which the garbage collector looks for what nobody needs any more.
+
+More than all imports make: what they make stays, and to go through it would be in vain.
+"""
 
 _before: dict[str, str | None] = {}
 """What `_environment` changed, and what it was before."""
@@ -108,10 +111,7 @@ def _environment(changes: Mapping[str, str]) -> Iterator[None]:
 
 @contextmanager
 def _seldom_collected() -> Iterator[None]:
-    """Have the garbage collector look less often within.
-
-    What is imported stays, and the collector would go through it a dozen times in vain.
-    """
+    """Have the garbage collector look less often within."""
     before = gc.get_threshold()
     # 0 is the user's wish that it never looks.
     if before[0]:
