@@ -108,7 +108,7 @@ def ctrl(plan: Plan) -> Array:
 
 
 def test_batch_of_unlike_legs_has_the_bits_of_each_alone() -> None:
-    """The first of them once more at the end: its controller drives legs that are not neighbours."""
+    """The first comes once more at the end: its controller drives legs that are not neighbours."""
     plans = [planned(*BRIEF, *settings) for settings in LEGS]
     every = [rollout.execute(plan) for plan in plans]
     together = rollout.run_all([*plans, plans[0]], 2)
