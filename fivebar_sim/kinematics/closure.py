@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from functools import lru_cache
 from typing import NamedTuple
@@ -16,11 +15,12 @@ from fivebar_sim.geometry import FiveBar
 from fivebar_sim.kinematics.leg_arrays import LegArrays
 from fivebar_sim.kinematics.planar import (
     Coordinates,
-    Scalar,
     angle_between,
     between,
     cross,
     joined,
+    root,
+    rotated,
     split,
     unit,
 )
@@ -120,13 +120,9 @@ def corners(leg: FiveBar, theta: Array, assembly: int | None = None) -> Corners:
     if leg.L6 == 0.0:
         return Corners(A, B, C, D, E, C)
 
-    BC = between(B, C)
-    cos = float(np.cos(leg.bend))
-    sin = float(np.sin(leg.bend))
+    CF = rotated(between(B, C), leg.bend)
     part = leg.L6 / leg.L2
-    x = C[0] + part * (cos * BC[0] - sin * BC[1])
-    z = C[1] + part * (cos * BC[1] + sin * BC[0])
-    return Corners(A, B, C, D, E, (x, z))
+    return Corners(A, B, C, D, E, (C[0] + part * CF[0], C[1] + part * CF[1]))
 
 
 def loop_joint(
@@ -169,16 +165,8 @@ def loop_joint(
 
     # Factored, like the root below: a difference of two squares would lose digits.
     along = (d2 + (leg.L2 - leg.L3) * high) / (2.0 * d2)
-    across = sign * (_root((high**2 - d2) * (d2 - low**2)) / (2.0 * d2))
+    across = sign * (root((high**2 - d2) * (d2 - low**2)) / (2.0 * d2))
     return B[0] + along * x - across * z, B[1] + along * z + across * x
-
-
-def _root(square: Scalar) -> Scalar:
-    """Return the root of what only rounding brings below 0, where it is 0."""
-    # NumPy's functions take twenty times as long for one number as those of math.
-    if isinstance(square, float):
-        return math.sqrt(max(square, 0.0))
-    return np.sqrt(np.maximum(square, 0.0))
 
 
 def _loop_open(d: Array, is_open: Bools, low: float, high: float) -> LoopOpenError:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -9,7 +11,18 @@ from fivebar_sim.arrays import Array, Bools, as_pairs, at, blocks, first_index
 from fivebar_sim.errors import ArgumentError, UnreachableError
 from fivebar_sim.geometry import MODES, FiveBar, Mode
 from fivebar_sim.kinematics.closure import ROUNDING, Points, bases, knees
-from fivebar_sim.kinematics.planar import direction, turned, unit, wrap
+from fivebar_sim.kinematics.planar import (
+    Coordinates,
+    Scalar,
+    between,
+    direction,
+    root,
+    rotated,
+    split,
+    turned,
+    unit,
+    wrap,
+)
 
 
 def side_angle(r: Array, near: float, far: float, s: int) -> tuple[Array, Bools]:
@@ -37,20 +50,20 @@ def side_angle(r: Array, near: float, far: float, s: int) -> tuple[Array, Bools]
     return _side_angle(r[..., 0], r[..., 1], near, far, s)
 
 
-def _side_angle(x: Array, z: Array, near: float, far: float, s: int) -> tuple[Array, Bools]:
-    """Return what `side_angle` does, with x and z as separate arrays."""
+def _side_angle(x: Scalar, z: Scalar, near: float, far: float, s: int) -> tuple[Any, Any]:
+    """Return what `side_angle` does, with x and z by themselves."""
     d2 = x * x + z * z
     low = (near - far) ** 2
     high = (near + far) ** 2
     # Factored: a difference of two squares would lose digits.
     N = d2 + (near - far) * (near + far)
     # Negative out of reach, and by rounding at the very edge of it; `reaches` tells the two apart.
-    S = s * np.sqrt(np.maximum((high - d2) * (d2 - low), 0.0))
+    S = s * root((high - d2) * (d2 - low))
     theta = direction(z * N + S * x, x * N - S * z)
     return theta, reaches(d2, near, far)
 
 
-def reaches(d2: Array, near: float, far: float) -> Bools:
+def reaches(d2: Scalar, near: float, far: float) -> Any:
     """Return whether a two-link chain spans a squared distance [m^2], with slack for rounding."""
     low = (near - far) ** 2
     high = (near + far) ** 2
@@ -64,22 +77,20 @@ def foot_radius_and_angle(leg: FiveBar) -> tuple[float, float]:
     return float(np.hypot(along, across)), float(np.arctan2(across, along))
 
 
-def _solve(
-    leg: FiveBar, foot: Array, mode: Mode
-) -> tuple[tuple[Array, Array], tuple[Bools, Bools]]:
-    """Return (theta_A, theta_E) of points (n, 2), and whether each side reaches: A to F, E to C."""
-    A, E = bases(leg)
+def _solve(leg: FiveBar, foot: Coordinates, mode: Mode) -> tuple[Coordinates, Coordinates]:
+    """Return (theta_A, theta_E) of points, and whether each side reaches: A to F, E to C."""
+    A, E = (each.tolist() for each in bases(leg))
     rho, phi = foot_radius_and_angle(leg)
-    x = foot[:, 0]
-    z = foot[:, 1]
+    x, z = foot
     theta_A, ok_A = _side_angle(x - A[0], z - A[1], leg.L1, rho, mode[0])
 
     # With an extension side E ends at C, which is known only once side A has placed L2.
     if leg.L6 > 0.0:
-        B = A + leg.L1 * unit(theta_A)
-        C = B + (leg.L2 / rho) * turned(foot - B, -phi)
-        x = C[:, 0]
-        z = C[:, 1]
+        B = A[0] + leg.L1 * np.cos(theta_A), A[1] + leg.L1 * np.sin(theta_A)
+        BC = rotated(between(B, foot), -phi)
+        part = leg.L2 / rho
+        x = B[0] + part * BC[0]
+        z = B[1] + part * BC[1]
 
     theta_E, ok_E = _side_angle(x - E[0], z - E[1], leg.L4, leg.L3, mode[1])
     return (theta_A, theta_E), (ok_A, ok_E)
@@ -97,7 +108,7 @@ def solve(leg: FiveBar, foot: Array, mode: Mode) -> tuple[Array, Bools]:
     with np.errstate(over="ignore", invalid="ignore"):
         # A block at a time: temporaries stay in the cache, which is three times faster.
         for block in blocks(len(flat)):
-            angles, reached = _solve(leg, flat[block], mode)
+            angles, reached = _solve(leg, split(flat[block]), mode)
             for side in (0, 1):
                 theta[block, side] = angles[side]
                 ok[block, side] = reached[side]
