@@ -20,8 +20,6 @@ from fivebar_sim.scenario import Scenario
 PAGE = Path(__file__).parents[1] / "docs" / "controllers.md"
 STUDY = "airhockey-pd"
 LONG = "duration=4.0"
-SHORT = "duration=1.25"
-"""Two of the ellipse's seven periods: their RMS is that of all to 1 %."""
 FREE = "servo={}"
 SLOW = "controller.period=0.01"
 BARS = {5: (150e-3, np.inf), 50: (30e-3, 70e-3), 150: (0.0, 25e-3)}
@@ -118,9 +116,11 @@ def test_study_agrees_with_the_equations_of_motion(ran: dict[str, Result]) -> No
     path = result.scenario.path
     law = Pd(kp=150.0, kd=5.0)
     still = np.zeros(2)
+    corners = path.at(np.arange(3.0)).position
 
     def torque(t: float, theta: Array, theta_dot: Array) -> Array:
-        foot = path.at(t).position
+        k = min(int(t), 1)  # a line takes a second
+        foot = corners[k] + (t - k) * (corners[k + 1] - corners[k])
         wanted = kinematics.inverse(leg, foot)
         wanted = wanted + 2.0 * np.pi * np.round((theta - wanted) / (2.0 * np.pi))
         reference = Reference(foot, still, still, wanted, still, still, still, 0.0)
