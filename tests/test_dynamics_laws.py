@@ -14,7 +14,7 @@ from poses import sample
 from fivebar_sim import dynamics, kinematics, model, motion
 from fivebar_sim.arrays import Array
 from fivebar_sim.dynamics.chain import Chain
-from fivebar_sim.dynamics.plane import placed
+from fivebar_sim.dynamics.plane import dot, placed, weigh
 from fivebar_sim.errors import ArgumentError, DivergedError
 from fivebar_sim.geometry import HEAVIEST, FiveBar
 from fivebar_sim.integrator import pull
@@ -382,17 +382,18 @@ def test_whole_seconds_and_the_ends_of_tolerances() -> None:
 
 
 @pytest.mark.parametrize("leg", [HEAVY, CLASSIC])
-def test_torques_without_accelerations_are_those_of_none(leg: FiveBar) -> None:
+def test_torques_without_weight_and_accelerations_are_those_of_turning(leg: FiveBar) -> None:
     """Bit by bit; of straight links too, which are placed in a shorter way."""
     theta, w, _, _ = state(leg)
-    chain = Chain.of(leg, None, 0.01)
+    chain = Chain.of(replace(leg, gravity=(0.0, 0.0)), None, 0.01)
     pose = chain.pose(theta[:, 0], theta[:, 1])
     rates = (w[:, 0], w[:, 1], w[:, 0] + 1.0, w[:, 1] - 2.0)
-    still = chain.link_torques(pose, rates, (0.0, 0.0, 0.0, 0.0))
-    for whole, short in zip(
-        still, chain.turning_torques(pose, rates, chain.moments(pose)), strict=True
-    ):
-        assert np.array_equal(whole, short)
+    X12, X43 = chain.turning(pose, chain.moments(pose))
+    alone = [X * rates[k] * rates[k] for X, k in ((-X12, 1), (X12, 0), (X43, 3), (-X43, 2))]
+    np.testing.assert_array_equal(chain.link_torques(pose, rates, (0.0, 0.0, 0.0, 0.0)), alone)
     for across in (0.0, 0.003):
         x, z = placed(pose.e2, (0.05, np.array(across)))
         np.testing.assert_array_equal(placed(pose.e2, (0.05, across)), (x, z))
+    for sideways in (0.0, 0.3):
+        whole = dot(pose.e2, (np.array(sideways), -9.81))
+        np.testing.assert_array_equal(weigh(pose.e2, (sideways, -9.81)), whole)

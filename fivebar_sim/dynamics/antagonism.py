@@ -17,7 +17,7 @@ import numpy as np
 
 from fivebar_sim import kinematics
 from fivebar_sim.arrays import Array, blocks
-from fivebar_sim.dynamics.chain import Chain
+from fivebar_sim.dynamics.chain import Chain, kept
 from fivebar_sim.dynamics.plane import Vector, cross, dot, placed, split
 from fivebar_sim.errors import FiveBarError
 from fivebar_sim.geometry import FiveBar
@@ -58,7 +58,7 @@ def price(leg: FiveBar, theta: Array, omega: Array, torque: Array) -> Price:
         FiveBarError: The serial leg does not reach a foot point, or a pose is open or singular.
     """
     serial = serial_leg(leg)
-    chain = Chain.of(leg, None, 0.0)
+    chain = kept(leg, None, 0.0)
     own = np.zeros(3)
     other = np.zeros(3)
     for rows in blocks(len(theta)):

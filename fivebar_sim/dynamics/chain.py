@@ -22,6 +22,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -29,7 +30,7 @@ import numpy as np
 from fivebar_sim import kinematics
 from fivebar_sim.arrays import Array, total
 from fivebar_sim.checks import check_number
-from fivebar_sim.dynamics.plane import Four, Scalar, Vector, cross, dot, placed
+from fivebar_sim.dynamics.plane import Four, Scalar, Vector, cross, dot, placed, weigh
 from fivebar_sim.errors import ArgumentError
 from fivebar_sim.geometry import HEAVIEST, FiveBar
 from fivebar_sim.kinematics.rates import SINGULAR
@@ -254,10 +255,10 @@ class Chain:
         """
         w1, w2, w3, w4 = w
         gravity = self.leg.gravity
-        r1, r2, r3, r4 = self.moments(p)
+        r = self.moments(p)
+        r1, r2, r3, r4 = r
         H12, H43 = self._coupled_by(p, r2, r3)
-        X12 = self.leg.L1 * cross(p.e1, r2)
-        X43 = self.leg.L4 * cross(p.e4, r3)
+        X12, X43 = self.turning(p, r)
 
         return (
             self.I1 * alpha[0] + H12 * alpha[1] - X12 * w2 * w2 - cross(r1, gravity),
@@ -266,20 +267,9 @@ class Chain:
             self.I4 * alpha[3] + H43 * alpha[2] - X43 * w3 * w3 - cross(r4, gravity),
         )
 
-    def turning_torques(self, p: Pose, w: Four, r: tuple[Vector, Vector, Vector, Vector]) -> Four:
-        """Return c - Q of links 1..4 [N m]: `link_torques` without accelerations, bit by bit.
-
-        Args:
-            p: The pose.
-            w: Rates of the links [rad/s].
-            r: Its `moments`, which other rates at the same pose share.
-        """
-        w1, w2, w3, w4 = w
-        gravity = self.leg.gravity
-        X12 = self.leg.L1 * cross(p.e1, r[1])
-        X43 = self.leg.L4 * cross(p.e4, r[2])
-        c = (-X12 * w2 * w2, X12 * w1 * w1, X43 * w4 * w4, -X43 * w3 * w3)
-        return tuple(each - cross(moment, gravity) for each, moment in zip(c, r, strict=True))
+    def turning(self, p: Pose, r: tuple[Vector, Vector, Vector, Vector]) -> Vector:
+        """Return X12 and X43 of `link_torques` [kg m^2], given the pose's `moments`."""
+        return self.leg.L1 * cross(p.e1, r[1]), self.leg.L4 * cross(p.e4, r[2])
 
     def at_motors(self, p: Pose, t: Four) -> Vector:
         """Return the motor torques G^T t [N m] of link torques t."""
@@ -350,8 +340,16 @@ class Chain:
         w1, w2, w3, w4 = w
         H12, H43 = self._coupled_by(p, r[1], r[2])
         turning = self.I1 * w1 * w1 + self.I2 * w2 * w2 + self.I3 * w3 * w3 + self.I4 * w4 * w4
-        lift = total(dot(moment, self.leg.gravity) for moment in (self.hung, *r))
+        lift = total(weigh(moment, self.leg.gravity) for moment in (self.hung, *r))
         return 0.5 * turning + H12 * w1 * w2 + H43 * w4 * w3, -lift
+
+
+# A controller asks for the same leg at every control step, and a run for every metric. Typed, since
+# 1.0 == True.
+@lru_cache(maxsize=256, typed=True)
+def kept(leg: FiveBar, assembly: int | None, payload: float) -> Chain:
+    """Return the constants of a leg as `Chain.of` does, worked out once."""
+    return Chain.of(leg, assembly, payload)
 
 
 def about_joint(link: Link) -> Scalar:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -13,7 +12,7 @@ from fivebar_sim import kinematics
 from fivebar_sim.arrays import Array, as_pairs, broadcast, finite
 from fivebar_sim.checks import check_number
 from fivebar_sim.dynamics import motion, stepwise
-from fivebar_sim.dynamics.chain import Chain, Pose
+from fivebar_sim.dynamics.chain import Chain, Pose, kept
 from fivebar_sim.dynamics.motion import Law, Motion
 from fivebar_sim.dynamics.plane import Vector, cross, placed, split
 from fivebar_sim.geometry import FiveBar
@@ -56,7 +55,7 @@ class LegDynamics:
 
     def __post_init__(self) -> None:
         # A frozen class sets its own fields only like this; `Chain.of` checks the other three.
-        object.__setattr__(self, "_chain", _chain(self.leg, self.assembly, self.payload))
+        object.__setattr__(self, "_chain", kept(self.leg, self.assembly, self.payload))
 
     def inverse(
         self,
@@ -192,13 +191,6 @@ class LegDynamics:
     def soft_loop(self, q: ArrayLike, timestep: float, damping: float) -> Array:
         """Return the motion with the loop gap that `implicitfast` needs [rad], (N + 1, 4)."""
         return stepwise.soften(self._chain, q, timestep, damping)
-
-
-# A controller asks for the same leg at every control step. Typed, since 1.0 == True.
-@lru_cache(maxsize=256, typed=True)
-def _chain(leg: FiveBar, assembly: int | None, payload: float) -> Chain:
-    """Return the constants of a leg, which `Chain.of` checks."""
-    return Chain.of(leg, assembly, payload)
 
 
 def _torques(chain: Chain, p: Pose, w: Vector, alpha: Vector, force: Vector) -> Vector:

@@ -30,6 +30,14 @@ def dot(a: Vector, b: Vector) -> Scalar:
     return a[0] * b[0] + a[1] * b[1]
 
 
+def weigh(r: Vector, gravity: Vector) -> Scalar:
+    """Return r . gravity, in a third of the time where gravity points down."""
+    gx, gz = gravity
+    if isinstance(gx, float) and gx == 0.0:
+        return r[1] * gz
+    return dot(r, gravity)
+
+
 def placed(e: Vector, r: Vector) -> Vector:
     """Return a vector r = (along, across) of a link in the hip frame; e is the link's direction."""
     along, across = r

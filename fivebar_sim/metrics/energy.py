@@ -21,8 +21,8 @@ from typing import NamedTuple
 import numpy as np
 
 from fivebar_sim import kinematics
-from fivebar_sim.arrays import Array, blocks
-from fivebar_sim.dynamics.chain import Chain, Pose
+from fivebar_sim.arrays import Array, blocks, total
+from fivebar_sim.dynamics.chain import Chain, Pose, kept
 from fivebar_sim.dynamics.plane import Four, Vector, placed
 from fivebar_sim.geometry import FiveBar
 from fivebar_sim.metrics.columns import (
@@ -37,11 +37,15 @@ from fivebar_sim.metrics.json_types import Amount, Number, Table
 STILL = 1e-8
 """Angle that no joint turns by in a leg that only stands [rad]; its balance would be rounding."""
 
+WORKS = ("motor", "force", "ground", "constraints", "step", "kinetic", "potential")
+"""What `Balance` has of each step."""
+
 Joints = tuple[Array, ...]
 """An angle or a rate of each of the joints A, B, E, D."""
 
 
-class Body(NamedTuple):
+@dataclass(frozen=True)
+class Body:
     """What moves.
 
     Attributes:
@@ -54,7 +58,7 @@ class Body(NamedTuple):
     payload: float
     trunk: float
 
-    @property
+    @cached_property
     def mass(self) -> float:
         """All of it [kg]."""
         return self.trunk + self.payload + sum(link.mass for link in self.leg.links)
@@ -151,18 +155,18 @@ class _Motion(NamedTuple):
     Attributes:
         q: Angle of each joint as in `mechanical` [rad], (n + 1,) each.
         v: Their rates [rad/s], (n + 1,) each.
-        hip: Height of the hip frame [m], (n + 1,).
-        hip_dot: Its rate [m/s], (n + 1,).
         w: Mean joint rates of each step [rad/s], (n,) each.
-        lift: Mean rate of the hip [m/s], (n,).
+        hip: Height of the hip frame [m], (n + 1,); a fixed hip is at 0 and never moves.
+        hip_dot: Its rate [m/s], (n + 1,) or 0.
+        lift: Its mean rate of each step [m/s], (n,) or 0.
     """
 
     q: Joints
     v: Joints
-    hip: Array
-    hip_dot: Array
     w: Joints
-    lift: Array
+    hip: Array | float = 0.0
+    hip_dot: Array | float = 0.0
+    lift: Array | float = 0.0
 
     @classmethod
     def of(cls, record: Mapping[str, Array], start: Array, rows: slice) -> _Motion:
@@ -170,24 +174,11 @@ class _Motion(NamedTuple):
         begun = zip(JOINT_COLUMNS, start[-4:], strict=True)
         q = tuple(_begun(record[name], rows, at) for name, at in begun)
         v = tuple(_begun(record[name], rows) for name in RATE_COLUMNS)
-        # A fixed hip is a hip at height 0 that never moves.
-        hip, hip_dot = np.zeros((2, len(q[0])))
-        if "hip_z" in record:
-            hip = _begun(record["hip_z"], rows, start[0])
-            hip_dot = _begun(record["hip_dot_z"], rows)
-        return cls(q, v, hip, hip_dot, tuple(_mean(each) for each in v), _mean(hip_dot))
-
-
-class _Works(NamedTuple):
-    """The columns of `Balance`, of some steps."""
-
-    motor: Array
-    force: Array
-    ground: Array
-    constraints: Array
-    step: Array
-    kinetic: Array
-    potential: Array
+        w = tuple(_mean(each) for each in v)
+        if "hip_z" not in record:
+            return cls(q, v, w)
+        hip_dot = _begun(record["hip_dot_z"], rows)
+        return cls(q, v, w, _begun(record["hip_z"], rows, start[0]), hip_dot, _mean(hip_dot))
 
 
 def balance(body: Body, record: Mapping[str, Array], steps: Steps) -> Balance:
@@ -200,14 +191,14 @@ def balance(body: Body, record: Mapping[str, Array], steps: Steps) -> Balance:
     """
     leg = body.leg
     rows = len(record["time"])
-    chain = Chain.of(leg, None, body.payload)
-    works = _Works(*np.empty((len(_Works._fields), rows)))
+    chain = kept(leg, None, body.payload)
+    works: dict[str, Array] = dict(zip(WORKS, np.empty((len(WORKS), rows)), strict=True))
     for part in blocks(rows):
-        for whole, values in zip(works, _works(body, chain, record, steps, part), strict=True):
-            whole[part] = values
+        for name, values in _works(body, chain, record, steps, part).items():
+            works[name][part] = values
 
     return Balance(
-        **works._asdict(),
+        **works,
         moved=_turned(leg, record, steps.start),
         lift=body.mass * float(np.hypot(*leg.gravity)) * leg.size,
     )
@@ -215,42 +206,53 @@ def balance(body: Body, record: Mapping[str, Array], steps: Steps) -> Balance:
 
 def _works(
     body: Body, chain: Chain, record: Mapping[str, Array], steps: Steps, rows: slice
-) -> _Works:
+) -> dict[str, Array | float]:
     """Return the works of some steps, and what the energies gained; see `balance`."""
-    leg = body.leg
     h = float(record["time"][0])
     m = _Motion.of(record, steps.start, rows)
     # Rates belong to the middle of the step that they moved the leg by; see above.
     middle = tuple(q - 0.5 * h * v for q, v in zip(m.q, m.v, strict=True))
-    kinetic, potential = _energies(body, chain, middle, m.v, m.hip - 0.5 * h * m.hip_dot, m.hip_dot)
-    pose = steps.before.links(rows) if steps.before else _open_pose(tuple(q[:-1] for q in m.q))
-    x, z = _foot_rates(leg, pose, m.w[0], m.w[0] + m.w[1])
-    none = np.zeros(len(m.lift))
-    acts = steps.force.size > 0
-    force = h * (steps.force[rows, 0] * x + steps.force[rows, 1] * z) if acts else none
-    ground = none
+    kinetic, potential = mechanical(body, middle, m.v, m.hip - 0.5 * h * m.hip_dot, m.hip_dot)
+    pose = steps.before.links(rows) if steps.before else open_pose(tuple(q[:-1] for q in m.q))
+    pushes, ground = _outer(body.leg, record, steps, rows, m, pose)
+
+    joints = m.w if isinstance(m.lift, float) else (m.lift, *m.w)
+    # Column by column: a sum over each short row by itself takes thirty times as long.
+    constraints = total(steps.constraint[rows, i] * rate for i, rate in enumerate(joints))
+    torque_A, torque_E = (record[name][rows] for name in TORQUE_COLUMNS)
+    return {
+        "motor": h * (torque_A * m.w[MOTOR_JOINTS[0]] + torque_E * m.w[MOTOR_JOINTS[1]]),
+        "force": h * pushes,
+        "ground": h * ground,
+        "constraints": h * constraints - h * ground,
+        "step": h * _given_away(chain, m, pose),
+        "kinetic": np.diff(kinetic),
+        "potential": np.diff(potential),
+    }
+
+
+def _outer(
+    leg: FiveBar, record: Mapping[str, Array], steps: Steps, rows: slice, m: _Motion, pose: Pose
+) -> tuple[Array | float, Array | float]:
+    """Return the powers of the pushes and of the ground in some steps [W], 0 without them."""
+    pushes = 0.0
+    ground = 0.0
+    pushed = steps.force.size > 0
+    if not pushed and "ground_z" not in record:
+        return pushes, ground
+
+    psi_2_dot = m.w[0] + m.w[1]
+    x, z = foot_rates(leg, pose, m.w[0], psi_2_dot)
+    if pushed:
+        pushes = steps.force[rows, 0] * x + steps.force[rows, 1] * z
     if "ground_z" in record:
         first = kinematics.chain_points(leg, steps.start[-4:]).F[1]
-        height = m.hip[:-1] + _begun(record["foot_z"], rows, first)[:-1] - leg.foot_radius
-        rolled = contact_radius(leg, height) * (m.w[0] + m.w[1])
+        hip = _begun(record["hip_z"], rows, steps.start[0])[:-1]
+        height = hip + _begun(record["foot_z"], rows, first)[:-1] - leg.foot_radius
+        rolled = contact_radius(leg, height) * psi_2_dot
         # The force acts on the ball's lowest point, which also rolls.
-        ground = h * (
-            record["ground_x"][rows] * (x + rolled) + record["ground_z"][rows] * (z + m.lift)
-        )
-
-    joints = (m.lift, *m.w) if "hip_z" in record else m.w
-    # Column by column: a sum over each short row by itself takes thirty times as long.
-    constraints = sum(steps.constraint[rows, i] * rate for i, rate in enumerate(joints))
-    torque_A, torque_E = (record[name][rows] for name in TORQUE_COLUMNS)
-    return _Works(
-        motor=h * (torque_A * m.w[MOTOR_JOINTS[0]] + torque_E * m.w[MOTOR_JOINTS[1]]),
-        force=force,
-        ground=ground,
-        constraints=h * constraints - ground,
-        step=h * _given_away(chain, m, pose),
-        kinetic=np.diff(kinetic),
-        potential=np.diff(potential),
-    )
+        ground = record["ground_x"][rows] * (x + rolled) + record["ground_z"][rows] * (z + m.lift)
+    return pushes, ground
 
 
 def _turned(leg: FiveBar, record: Mapping[str, Array], start: Array) -> bool:
@@ -277,19 +279,21 @@ def _given_away(chain: Chain, m: _Motion, p: Pose) -> Array:
         m: Its motion.
         p: The poses before each step.
     """
-    v = tuple(rate[:-1] for rate in _of_links(m.v))
+    v = _of_links(tuple(rate[:-1] for rate in m.v))
     w = _of_links(m.w)
     moments = chain.moments(p)
-    at_start = chain.turning_torques(p, v, moments)
-    meant = chain.turning_torques(p, w, moments)
-    links = sum((c - d) * rate for c, d, rate in zip(at_start, meant, w, strict=True))
-    hip = sum(r[1] * (a * a - b * b) for r, a, b in zip(moments, v, w, strict=True))
-
-    return np.asarray(hip * m.lift - links)
+    X12, X43 = chain.turning(p, moments)
+    # v^2 - w^2 of each link.
+    a, b, c, d = ((before - mean) * (before + mean) for before, mean in zip(v, w, strict=True))
+    links = X12 * (a * w[1] - b * w[0]) + X43 * (d * w[2] - c * w[3])
+    if isinstance(m.lift, float):
+        return -links
+    hip = total(r[1] * each for r, each in zip(moments, (a, b, c, d), strict=True))
+    return hip * m.lift - links
 
 
 def mechanical(
-    body: Body, q: Array, v: Array, hip: Array | float = 0.0, hip_dot: Array | float = 0.0
+    body: Body, q: Joints, v: Joints, hip: Array | float = 0.0, hip_dot: Array | float = 0.0
 ) -> Vector:
     """Return the kinetic energy and the potential one, zero with all masses at height 0 [J], (...).
 
@@ -297,47 +301,38 @@ def mechanical(
 
     Args:
         body: What moves.
-        q: (theta_A, theta_B, theta_E, theta_D), knees relative to L1 and L4 [rad], (..., 4).
-        v: Their rates [rad/s], (..., 4).
+        q: (theta_A, theta_B, theta_E, theta_D), knees relative to L1 and L4 [rad], (...) each.
+        v: Their rates [rad/s], (...) each.
         hip: Height of the hip frame [m], (...).
         hip_dot: Its rate [m/s], (...).
     """
-    chain = Chain.of(body.leg, None, body.payload)
-    return _energies(body, chain, _columns(q), _columns(v), hip, hip_dot)
-
-
-def _energies(
-    body: Body, chain: Chain, q: Joints, v: Joints, hip: Array | float, hip_dot: Array | float
-) -> tuple[Array, Array]:
-    """Return what `mechanical` does, of each joint's angles and rates (...)."""
-    p = _open_pose(q)
+    chain = kept(body.leg, None, body.payload)
+    p = open_pose(q)
     w = _of_links(v)
     moments = chain.moments(p)
     kinetic, potential = chain.energies(p, w, moments)
-    momentum = sum(r[0] * rate for r, rate in zip(moments, w, strict=True))
-    gravity = body.leg.gravity[1]
+    # A fixed hip.
+    if isinstance(hip, float) and isinstance(hip_dot, float) and hip == hip_dot == 0.0:
+        return kinetic, potential
+
+    momentum = total(r[0] * rate for r, rate in zip(moments, w, strict=True))
     return (
         kinetic + hip_dot * (momentum + 0.5 * body.mass * hip_dot),
-        potential - body.mass * gravity * hip,
+        potential - body.mass * body.leg.gravity[1] * hip,
     )
 
 
-def foot_rates(leg: FiveBar, q: Array, v: Array) -> Array:
+def foot_rates(leg: FiveBar, p: Pose, psi_1_dot: Array, psi_2_dot: Array) -> Vector:
     """Return the velocity of the foot in the hip frame, that of the open chain A-B-F [m/s].
 
     perp(AB) psi_1_dot + perp(BF) psi_2_dot,   perp(x, z) = (-z, x)
 
     Args:
         leg: The leg.
-        q: Joint angles as in `mechanical` [rad], (..., 4).
-        v: Their rates [rad/s], (..., 4).
+        p: Its pose.
+        psi_1_dot: Rate of L1's direction [rad/s], (...).
+        psi_2_dot: Rate of L2's direction [rad/s], (...).
     """
-    pose = _open_pose(_columns(q))
-    return np.stack(_foot_rates(leg, pose, v[..., 0], v[..., 0] + v[..., 1]), axis=-1)
-
-
-def _foot_rates(leg: FiveBar, p: Pose, psi_1_dot: Array, psi_2_dot: Array) -> tuple[Array, Array]:
-    """Return what `foot_rates` does, x and z, of poses and the rates of L1 and L2."""
     BF = placed(p.e2, leg.foot_offset)
     x = -(leg.L1 * p.e1[1]) * psi_1_dot - BF[1] * psi_2_dot
     return x, leg.L1 * p.e1[0] * psi_1_dot + BF[0] * psi_2_dot
@@ -348,12 +343,11 @@ def measure(found: Balance) -> Energy:
 
     The net works and gains of `Balance` [J], and its turnover and imbalance.
     """
-    works = ("motor", "force", "ground", "constraints", "step", "kinetic", "potential")
-    net = {name: float(getattr(found, name).sum()) for name in works}
+    net = {name: float(getattr(found, name).sum()) for name in WORKS}
     return Energy(**net, turnover=found.turnover, imbalance=found.imbalance)
 
 
-def _open_pose(q: Joints) -> Pose:
+def open_pose(q: Joints) -> Pose:
     """Return the directions of the links at joint angles as in `mechanical`."""
     return Pose(*((np.cos(psi), np.sin(psi)) for psi in _of_links(q)))
 
@@ -362,11 +356,6 @@ def _of_links(q: Joints) -> Four:
     """Return psi_1..psi_4, the links' own directions, of joint angles; or their rates, of rates."""
     A, B, E, D = q
     return A, A + B, E + D, E
-
-
-def _columns(q: Array) -> Joints:
-    """Return each joint's part of (..., 4)."""
-    return q[..., 0], q[..., 1], q[..., 2], q[..., 3]
 
 
 def _mean(rate: Array) -> Array:

@@ -99,12 +99,10 @@ def _needed(planned: Plan, steps: NDArray[np.intp]) -> Array:
     # A step's acceleration is known from the one before it; before the first one the leg rests.
     pairs = steps[:, None] + np.array([-1, 0])
     before = np.maximum(pairs, 0)
-    found = dynamics.step_torques(
-        planned.scenario.leg,
+    found = dynamics.LegDynamics(planned.scenario.leg, payload=wanted.payload).step_torques(
         wanted.q[np.concatenate([before, pairs[:, 1:] + 1], axis=1)],
         wanted.timestep,
         wanted.force[before],
-        payload=wanted.payload,
     )
     return found[:, 1]
 
