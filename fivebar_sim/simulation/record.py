@@ -21,7 +21,6 @@ from fivebar_sim.metrics.columns import (
     GROUND_COLUMNS,
     HIP_COLUMNS,
     JOINTS,
-    MOTOR_JOINTS,
     MOTORS_FROM_END,
     RAIL_COLUMN,
     Record,
@@ -95,10 +94,11 @@ def forces(planned: Plan, part: Part) -> Array:
     MuJoCo counts the latter as damping, which a motor has too.
     """
     states = part.states
+    viscous = planned.scenario.servo.gear.viscous
+    if viscous == 0.0:
+        return states.constraint[0]
     found = states.constraint[0].copy()
-    found[:, MOTORS_FROM_END] -= (
-        planned.scenario.servo.gear.viscous * states.qvel[0, :, MOTORS_FROM_END]
-    )
+    found[:, MOTORS_FROM_END] -= viscous * states.qvel[0, :, MOTORS_FROM_END]
     return found
 
 
@@ -137,14 +137,13 @@ def _torque(planned: Plan, part: Part) -> Array:
 
 def _steps(planned: Plan, part: Part) -> MotorStep:
     """Return every step as the motors see it, (n, 2)."""
-    q, v, ctrl = _joints(part.states)
-    before = np.concatenate([part.before[None, -4:], q[:-1]])
+    q = part.states.qpos[0, :, MOTORS_FROM_END]
     return MotorStep(
         integrator=planned.scenario.sim.integrator,
-        ctrl=ctrl,
-        q=before[:, MOTOR_JOINTS],
-        q_next=q[:, MOTOR_JOINTS],
-        v_next=v[:, MOTOR_JOINTS],
+        ctrl=_joints(part.states)[2],
+        q=np.concatenate([part.before[None, MOTORS_FROM_END], q[:-1]]),
+        q_next=q,
+        v_next=part.states.qvel[0, :, MOTORS_FROM_END],
         drive=drive(planned),
     )
 

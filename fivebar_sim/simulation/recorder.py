@@ -44,7 +44,8 @@ class Recorder:
         # Of the links, (x, z) each: before the first step too.
         self._along: Array = np.empty((4, 2, steps + 1))
         self._along[..., 0] = directions(planned.start[-4:])
-        self._constraint: Array = np.empty((steps, planned.model.nv))
+        # Column by column in memory, as all else.
+        self._constraint: Array = np.empty((planned.model.nv, steps)).T
         self._saturated: Bools = np.empty((steps, 2), dtype=bool)
         self._unsolved: Bools = np.empty(steps, dtype=bool)
         self._warnings = 0
@@ -53,7 +54,7 @@ class Recorder:
         """Take the next states of this one simulation."""
         for rows in blocks(states.time.shape[1]):
             if self.error is None:
-                self._add(states.part(rows))
+                self._add(states.part(rows).by_columns())
 
         # The warnings are counted at the end of all these states.
         self._warnings = int(states.warnings[0])
@@ -71,12 +72,10 @@ class Recorder:
         rows = slice(self._done, self._done + states.time.shape[1])
         # The states of a breakdown may overflow; such an angle counts as off the path.
         with np.errstate(all="ignore") if self.error is not None else nullcontext():
-            along = directions(states.qpos[0, :, -4:])
+            along = self._directed(states.qpos[0, :, -4:], rows)
             points = record.points(planned, part, along)
             self._fill(self._columns, rows, record.columns(planned, part, points))
             # Of the same sines and cosines: the energies, the branch, and depths in the floor.
-            for kept, each in zip(self._along, along, strict=True):
-                kept[:, rows.start + 1 : rows.stop + 1] = each.T
             self._signs[:, rows] = branch.signs(planned.scenario.leg, points)
             if "ground_z" in self._columns:
                 self._fill(self._heights, rows, ground.joint_heights(planned.scenario.leg, points))
@@ -86,6 +85,16 @@ class Recorder:
         self._unsolved[rows] = states.iterations[0] >= planned.model.opt.iterations
         self._before = states.qpos[0, -1].copy()
         self._done = rows.stop
+
+    def _directed(self, q: Array, rows: slice) -> tuple[Array, Array, Array, Array]:
+        """Return the `directions` of joint angles, (n, 2) each, and keep them."""
+        angles = (q[:, 0], q[:, 0] + q[:, 1], q[:, 2] + q[:, 3], q[:, 2])
+        kept = self._along[..., rows.start + 1 : rows.stop + 1]
+        for (x, z), angle in zip(kept, angles, strict=True):
+            np.cos(angle, out=x)
+            np.sin(angle, out=z)
+        one, two, three, four = kept
+        return one.T, two.T, three.T, four.T
 
     def _fill(self, columns: Record, rows: slice, parts: Record) -> None:
         """Fill rows of columns, each of which lies in one piece of memory of its own."""

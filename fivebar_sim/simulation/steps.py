@@ -68,6 +68,14 @@ class States(NamedTuple):
         """Return some of the steps, as views."""
         return States(*(field[:, steps] for field in self[:-1]), warnings=self.warnings)
 
+    def by_columns(self) -> States:
+        """Return the same with the steps of each number one after the other in memory."""
+        # What is worked out of them then runs through memory in one go, two or three times as fast.
+        names = ("time", "qpos", "qvel", "ctrl", "ground", "constraint")
+        fields = {name: getattr(self, name).swapaxes(1, -1) for name in names}
+        ordered = {name: np.ascontiguousarray(each) for name, each in fields.items()}
+        return self._replace(**{name: each.swapaxes(1, -1) for name, each in ordered.items()})
+
     def rows(self, which: slice | list[int]) -> States:
         """Return some of the simulations."""
         return States(*(field[which] for field in self))
