@@ -6,6 +6,7 @@ import re
 
 import msgspec
 import pytest
+from run_once import run_once
 
 from fivebar_sim import rollout
 from fivebar_sim.metrics.limits import look_up
@@ -83,12 +84,17 @@ CASES = (
 """A scenario, settings, what is said first, and last, and a metric that is wrong by 5 % or more."""
 
 
+def run(scenario: Scenario) -> Result:
+    """Run a scenario, once for all tests."""
+    return run_once(scenario, lambda: rollout.run(scenario))
+
+
 def ran(name: str, *settings: str) -> Result:
-    return rollout.run(Scenario.load(name, [*PLAIN, *settings]))
+    return run(Scenario.load(name, [*PLAIN, *settings]))
 
 
 def owed(result: Result) -> list[str]:
-    return coarse.warnings(result, rollout.run)
+    return coarse.warnings(result, run)
 
 
 @pytest.mark.parametrize(("name", "settings", "said", "why", "key"), CASES)
@@ -178,7 +184,7 @@ class Counted:
     def run(self, scenario: Scenario) -> Result:
         """Run a scenario."""
         self.steps.append(scenario.steps)
-        return rollout.run(scenario)
+        return run(scenario)
 
 
 def test_only_a_doubt_costs_a_quarter_and_a_tripped_guard_costs_nothing() -> None:

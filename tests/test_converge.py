@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 
 import pytest
+from run_once import run_once
 from shell import Shell
 
 from fivebar_sim import rollout
@@ -41,6 +42,16 @@ def test_wrong_share_is_seen(shell: Shell) -> None:
     assert {"load.share_A", "load.torque_rms.E"} <= set(found["failed"])
 
 
+@pytest.fixture
+def each_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Simulate no run again: what a command says of it is asked."""
+    execute = rollout.execute
+    monkeypatch.setattr(
+        rollout, "execute", lambda plan: run_once(plan.scenario, lambda: execute(plan))
+    )
+
+
+@pytest.mark.usefixtures("each_once")
 def test_table_says_what_the_json_says(shell: Shell) -> None:
     args = ("converge", "short.toml", "--alone")
     said = shell(*args)
@@ -58,6 +69,7 @@ def test_table_says_what_the_json_says(shell: Shell) -> None:
     assert shell(*args, "--quiet").out == ""
 
 
+@pytest.mark.usefixtures("each_once")
 def test_bar_and_table_decide(shell: Shell) -> None:
     tight = ("converge", "short.toml", "--alone", "--bar", "1e-9")
     assert shell(*tight).status == 1

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from functools import cache
 from pathlib import Path
 
 import mujoco
@@ -139,6 +140,7 @@ tests/test_scenarios_rounding.py looks for.
 """
 
 
+@cache
 def ran(name: str, *settings: str) -> Result:
     return rollout.run(Scenario.load(name, ["limits={}", *settings]))
 
