@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 import shared
+from _pytest.runner import runtestprotocol
 from hypothesis import HealthCheck, settings
 from shell import CSV, JUDGED, Shell
 
@@ -88,6 +89,24 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: Producer) -> LoadFil
             return str(Path(file).parent) if "in_browser" in file else file
 
     return Together(config, log) if config.getoption("dist") == "loadfile" else None
+
+
+def pytest_runtest_protocol(item: pytest.Item, nextitem: pytest.Item | None) -> bool | None:
+    """Have a worker of xdist send of a test that passes what came of it, and no more.
+
+    Else it also sends that the test begins, is set up and is torn down: four messages, which take
+    workers and who started them as long as a short test does. Whoever asks for every duration, or
+    for JUnit's file, gets all of them.
+    """
+    asked = item.config.getoption("durations") or item.config.getoption("xmlpath")
+    if asked or "PYTEST_XDIST_WORKER" not in os.environ:
+        return None
+
+    for report in runtestprotocol(item, log=False, nextitem=nextitem):
+        if report.when == "call" or not report.passed:
+            item.ihook.pytest_runtest_logreport(report=report)
+    item.ihook.pytest_runtest_logfinish(nodeid=item.nodeid, location=item.location)
+    return True
 
 
 @pytest.fixture(scope="session", autouse=True)
