@@ -42,7 +42,7 @@ def test_a_few_generations_hop_higher_and_again_alike(
 ) -> None:
     """The second time in blocks, as on a cluster."""
     monkeypatch.setitem(script["train"].__globals__, "LEGS", 24)
-    first = list(script["train"](5, 5, duration=0.4))
+    first = list(script["train"](3, 5, duration=0.4))
     again = list(script["train"](1, 5, duration=0.4, workers=Here()))
     assert first[-1].average > first[0].average + 0.05
     assert first[-1].best > first[0].best
