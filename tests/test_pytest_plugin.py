@@ -9,6 +9,7 @@ import sys
 import tomllib
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 from xml.etree import ElementTree
 
@@ -18,7 +19,7 @@ from hypothesis import strategies as st
 from shell import ELLIPSE
 
 from fivebar_sim import pytest_plugin
-from fivebar_sim.report import look
+from fivebar_sim.report import in_plane, look, over_time
 from fivebar_sim.runs import stored
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -187,11 +188,21 @@ def test_nothing(k):
 """
 
 
-def test_fixtures_of_any_scope_run_legs(
-    session: Session, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """A failed test keeps what the shared fixtures that it uses have run, and JUnit says where."""
+@pytest.fixture
+def sketched(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Draw nothing in pictures; `test_runs_of_a_test_and_its_fixture_are_kept_once` has real ones.
+
+    A figure takes longer than the run that it is of.
+    """
+    for room, name in ((in_plane, "foot_path"), (over_time, "tracking_error")):
+        empty = SimpleNamespace(key=name.replace("_", "-"), figure=None)
+        monkeypatch.setattr(room, name, lambda run, drawn=empty: drawn)
     monkeypatch.setattr(look, "png", lambda figure: b"drawn")
+
+
+@pytest.mark.usefixtures("sketched")
+def test_fixtures_of_any_scope_run_legs(session: Session, tmp_path: Path) -> None:
+    """A failed test keeps what the shared fixtures that it uses have run, and JUnit says where."""
     said = session(SHARED, "--junit-xml=junit.xml", failed=4, passed=2)
     kept = {
         "second": {"mine", "strict"},
@@ -223,10 +234,8 @@ def test_plugin_asks_nothing_of_an_old_pluggy() -> None:
     assert not any(options["wrapper"] for options in asked)
 
 
-def test_failed_test_says_what_broke_and_keeps_its_runs(
-    session: Session, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(look, "png", lambda figure: b"drawn")  # real ones: the test below
+@pytest.mark.usefixtures("sketched")
+def test_failed_test_says_what_broke_and_keeps_its_runs(session: Session, tmp_path: Path) -> None:
     source = """
 import pytest
 
