@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import cache
 from typing import Any, get_args, get_origin
 
 import msgspec
@@ -55,14 +56,24 @@ def judged(
 def _filled(kind: type[Any], values: Mapping[str, Any]) -> Any:
     """Return a table with the values that are given, and None for every other."""
     fields = {}
-    for field in msgspec.structs.fields(kind):
-        if field.default is msgspec.UNSET and field.name not in values:
+    for name, table, required in _fields(kind):
+        if not required and name not in values:
             continue
-        union = () if get_origin(field.type) is list else get_args(field.type)
-        kinds = [each for each in (field.type, *union) if _is_table(each)]
-        value = values.get(field.name)
-        fields[field.name] = _filled(kinds[0], value or {}) if kinds else value
+        value = values.get(name)
+        fields[name] = value if table is None else _filled(table, value or {})
     return kind(**fields)
+
+
+@cache
+def _fields(kind: type[Any]) -> list[tuple[str, type[Any] | None, bool]]:
+    """Return a table's keys: of each the table that it holds, if any, and whether it must be."""
+    found = []
+    for field in msgspec.structs.fields(kind):
+        union = () if get_origin(field.type) is list else get_args(field.type)
+        tables = [each for each in (field.type, *union) if _is_table(each)]
+        required = field.default is not msgspec.UNSET
+        found.append((field.name, tables[0] if tables else None, required))
+    return found
 
 
 def _is_table(kind: Any) -> bool:
