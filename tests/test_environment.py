@@ -26,7 +26,6 @@ from fivebar_sim.tasks import KINDS, Randomise
 # isort: split
 from absl.testing import absltest
 from dm_control.rl import control
-from dm_control.suite.wrappers import action_noise, action_scale
 
 
 class Conformance(test_utils.EnvironmentTestMixin):
@@ -195,6 +194,9 @@ def test_the_viewer_would_run_it() -> None:
 
 def test_wrappers_of_the_suite_apply() -> None:
     """They draw from `task.random`, and scale actions to the bounds exactly."""
+    # All of the suite's own robots come with them.
+    from dm_control.suite.wrappers import action_noise, action_scale
+
     env = action_noise.Wrapper(environment.load("track", seed=0), scale=0.01)
     env = action_scale.Wrapper(env, minimum=-1.0, maximum=1.0)
     env.reset()

@@ -9,7 +9,7 @@ import msgspec
 import numpy as np
 import pytest
 import tomli_w
-from shipped import NAMES, shortened
+from shipped import NAMES, in_short, shortened
 
 from fivebar_sim import rollout
 from fivebar_sim.control import Setpoints
@@ -165,8 +165,8 @@ def test_resolved_table_gives_the_same_run(tmp_path: Path, name: str) -> None:
     folder = tmp_path / "run"
     folder.mkdir()
     (folder / "scenario.toml").write_text(tomli_w.dumps(first.table()), encoding="utf-8")
-    for name, content in first.files.items():
-        (folder / name).write_bytes(content)
+    for file, content in first.files.items():
+        (folder / file).write_bytes(content)
     again = Scenario.load(folder / "scenario.toml")
     assert again.table() == first.table()
     if isinstance(first.path, Csv) and isinstance(again.path, Csv):
@@ -175,7 +175,7 @@ def test_resolved_table_gives_the_same_run(tmp_path: Path, name: str) -> None:
     assert again == first
     if not isinstance(first.controller, Setpoints):
         return  # as long as ten others; test_record.py runs one of them again
-    one = rollout.run(first)
+    one = rollout.run(first) if name == "odd" else in_short(name)
     two = rollout.run(Scenario.load(folder / "scenario.toml"))
     for column in one.record:
         np.testing.assert_array_equal(two.record[column], one.record[column])
