@@ -34,7 +34,7 @@ def test_boundary_points_are_of_both_sides_and_wherever_nearest_goes(mode: AnyMo
         chord = np.concatenate([np.diff(x, axis=0) for x in pieces])
         step = length(chord)
         assert step.max() < 0.04 * leg.size
-        away = np.abs(workspace.distance(leg, [*(start + 0.5 * chord), *b], mode=mode))
+        away = np.abs(workspace.distance(leg, np.concatenate([start + 0.5 * chord, b]), mode=mode))
         bulge = away[: len(start)]
         assert (bulge < 0.006 * step + 1e-12 * leg.size).all()  # a turn of 0.04: its eighth
         assert away[len(start) :].max() < 1e-13 * leg.size
