@@ -112,7 +112,7 @@ class Balance:
     def turnover(self) -> float:
         """Sum of the absolute works of motors, pushes, ground, constraints and gravity [J]."""
         acting = (self.motor, self.force, self.ground, self.constraints, self.potential)
-        return float(np.sum(np.abs(acting)))
+        return total(float(np.abs(each).sum()) for each in acting)
 
     @cached_property
     def unaccounted(self) -> Array:

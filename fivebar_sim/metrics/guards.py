@@ -25,7 +25,7 @@ from fivebar_sim.geometry import FiveBar
 from fivebar_sim.kinematics.stops import Ranges, beyond
 from fivebar_sim.metrics import ground
 from fivebar_sim.metrics.branch import Branch
-from fivebar_sim.metrics.columns import JOINT_COLUMNS
+from fivebar_sim.metrics.columns import JOINT_COLUMNS, side_by_side
 from fivebar_sim.metrics.energy import Balance
 from fivebar_sim.metrics.json_types import LARGEST, Amount, Number, Table
 from fivebar_sim.metrics.lasting import chattering, clipped
@@ -259,9 +259,7 @@ def _unsolved(run: Evidence) -> Found:
 
 def _leaned(run: Evidence) -> Found:
     # Nobody planned the force of a stop: the motion is not the one that was asked for.
-    # Each joint in one piece of memory: it is looked at by itself.
-    q = np.stack([run.record[name] for name in JOINT_COLUMNS]).T
-    found = beyond(q, run.ranges)
+    found = beyond(side_by_side(run.record, JOINT_COLUMNS), run.ranges)
     return first_of(run, {f"joint {joint}": found[joint] for joint in found}, run.bounds.stops)
 
 
@@ -319,7 +317,9 @@ def _creeping(run: Evidence) -> Found | None:
 
 
 def _highest(run: Evidence, values: Array, high: float) -> Found:
-    return Found(float(values.max()), high, _first(values > high, run.record["time"]))
+    worst = float(values.max())
+    # Nearly every guard of nearly every run holds; NaN does not.
+    return Found(worst, high, None if worst <= high else _first(values > high, run.record["time"]))
 
 
 def first_of(run: Evidence, parts: Mapping[str, Array], high: float) -> Found:

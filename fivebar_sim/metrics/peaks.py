@@ -57,15 +57,18 @@ def measure(record: Mapping[str, Array], window: slice) -> Peaks:
         record: The columns of rollout.parquet.
         window: The rows to look at.
     """
-    return _named({name: float(size[window].max()) for name, size in _sizes(record).items()})
+    rows = {name: column[window] for name, column in record.items()}
+    return _named({name: float(size.max()) for name, size in _sizes(rows).items()})
 
 
 def measure_whole(record: Mapping[str, Array]) -> Whole:
     """Return the peaks of the whole run, with the end of the step in which each occurs."""
     time = record["time"]
-    at = {name: float(time[np.argmax(size)]) for name, size in _sizes(record).items()}
-    peaks = measure(record, slice(None))
-    return Whole(**msgspec.structs.asdict(peaks), at=_named(at))
+    sizes = _sizes(record)
+    rows = {name: int(np.argmax(size)) for name, size in sizes.items()}
+    peaks = _named({name: float(size[rows[name]]) for name, size in sizes.items()})
+    at = _named({name: float(time[k]) for name, k in rows.items()})
+    return Whole(**msgspec.structs.asdict(peaks), at=at)
 
 
 def _sizes(record: Mapping[str, Array]) -> dict[str, Array]:

@@ -9,6 +9,7 @@ import numpy as np
 
 from fivebar_sim import kinematics
 from fivebar_sim.arrays import Array, Bools
+from fivebar_sim.control import Feedback
 from fivebar_sim.control.servo import Drive, MotorStep, applied_torque
 from fivebar_sim.control.servo import saturated as clipped
 from fivebar_sim.dynamics import gears
@@ -149,7 +150,12 @@ def _steps(planned: Plan, part: Part) -> MotorStep:
 
 
 def growth(planned: Plan, record: Record) -> Array | None:
-    """Return the decades by which errors of the feedback would have grown by each step, (N,)."""
+    """Return the decades by which errors of the feedback would have grown by each step, (N,).
+
+    None without feedback, or where it cannot be told.
+    """
+    if not isinstance(planned.scenario.controller, Feedback):
+        return None
     angles = motors(record, "theta")
     rates = motors(record, "theta_dot")
     stands = np.zeros(len(angles), dtype=bool)
@@ -162,7 +168,8 @@ def growth(planned: Plan, record: Record) -> Array | None:
 def lowest(built: mujoco.MjModel) -> float:
     """Return the height of the lowest point of hip and trunk above the hip frame's origin [m]."""
     # The trunk of a rail has its origin in the hip's; both carry boxes alone.
-    bodies = [i for i in range(built.nbody) if built.body(i).name in ("hip", "trunk")]
+    kind = mujoco.mjtObj.mjOBJ_BODY
+    bodies = [mujoco.mj_name2id(built, kind, name) for name in ("hip", "trunk")]
     geoms = np.flatnonzero(np.isin(built.geom_bodyid, bodies))
     turned = np.empty(9)
     below = []
