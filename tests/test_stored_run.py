@@ -6,12 +6,14 @@ import json
 import re
 import shutil
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 
 import numpy as np
 import pyarrow
 import pyarrow.parquet
 import pytest
+from reports import unrecorded
 from sealed import seal
 
 from fivebar_sim import rollout
@@ -28,7 +30,8 @@ def result() -> Result:
 
 @pytest.fixture(scope="module")
 def written(result: Result, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return result.write(tmp_path_factory.mktemp("runs") / "landing")
+    with unrecorded():
+        return result.write(tmp_path_factory.mktemp("runs") / "landing")
 
 
 def test_what_was_written_comes_back(result: Result, written: Path) -> None:
@@ -45,17 +48,24 @@ def test_what_was_written_comes_back(result: Result, written: Path) -> None:
 def trot(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return a run whose foot follows a CSV."""
     made = rollout.run(Scenario.load("q8bot-trot", ["duration=2.1"]))
-    return made.write(tmp_path_factory.mktemp("runs") / "trot")
+    with unrecorded():
+        return made.write(tmp_path_factory.mktemp("runs") / "trot")
 
 
 def _edited(file: Path) -> None:
     file.write_bytes(file.read_bytes() + b"\n")
 
 
+@cache
+def _other() -> Result:
+    """Return what comes of the same scenario with a stiffer servo."""
+    return rollout.run(Scenario.load("q8bot-trot", ["duration=2.1", "servo.kp=20.0"]))
+
+
 def _of_other(run: Path, name: str) -> None:
-    """Put the file of another run there, of the same scenario with a stiffer servo."""
-    other = rollout.run(Scenario.load("q8bot-trot", ["duration=2.1", "servo.kp=20.0"]))
-    shutil.copy(other.write(run.parent / "other") / name, run / name)
+    """Put the file of another run there."""
+    with unrecorded():
+        shutil.copy(_other().write(run.parent / "other") / name, run / name)
 
 
 def _scaled(run: Path, column: str) -> None:
