@@ -21,9 +21,10 @@ EQUAL = 1e-9
 """Relative, of a metric; works are compared as a part of all the energy turned over."""
 
 
-@pytest.fixture(params=shipped.NAMES)
-def run(request: pytest.FixtureRequest, tmp_path: Path) -> Run:
-    return recomputed_run.read(shipped.written(request.param, tmp_path))
+@pytest.fixture(scope="module", params=shipped.NAMES)
+def run(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Run:
+    folder = tmp_path_factory.mktemp("runs")
+    return recomputed_run.read(shipped.written(request.param, folder))
 
 
 def test_every_metric_is_what_the_record_says(run: Run) -> None:
