@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 
 import msgspec
+import numpy as np
 import pytest
 from run_once import run_once
 
@@ -13,7 +14,7 @@ from fivebar_sim.metrics.limits import look_up
 from fivebar_sim.rollout import Result
 from fivebar_sim.runs import coarse
 from fivebar_sim.scenario import Scenario
-from fivebar_sim.scenario.refined import shortened
+from fivebar_sim.scenario.refined import repeats, shortened
 
 PLAIN = ("limits={}", "converge={}")
 
@@ -212,6 +213,64 @@ def test_of_a_long_run_the_first_steps_are_taken_again(monkeypatch: pytest.Monke
         "with ever shorter ones, in the first 2.05 s, torque A peak is about 198.7 mN m" in warning
     )
     assert again.steps == [2050, 2 * 2050, 4 * 2050]
+
+
+LONG = "duration=6"
+"""Of a path at 2 Hz with a ramp of 0.25 s: three periods are less than a third of it."""
+
+
+def test_run_that_repeats_itself_is_taken_again_briefly() -> None:
+    again = Counted()
+    assert coarse.warnings(ran("classic-ellipse", LONG), again.run) == []
+    assert again.steps == [1750, 3500]
+
+
+def test_brief_run_warns_as_the_whole_one_does(monkeypatch: pytest.MonkeyPatch) -> None:
+    name, settings, said, why, _ = CASES[3]
+    result = ran(name, *settings, LONG)
+    (brief,) = owed(result)
+    monkeypatch.setattr(coarse, "brief", lambda scenario: scenario)
+    (whole,) = owed(result)
+    assert whole.startswith(said)
+    numbers = re.compile(r"(\S+) mm")
+    # The first period, which has the start in it, is one of three, not of eleven.
+    expected = [float(number) for number in numbers.findall(whole)]
+    assert [float(number) for number in numbers.findall(brief)] == pytest.approx(expected, rel=1e-3)
+    assert brief.startswith(said.replace(" of it ", " of it, in the first 1.75 s, "))
+    assert brief.endswith(why)
+
+
+def test_run_that_repeats_itself_only_in_its_own_steps_is_taken_again_whole() -> None:
+    class Restless(Counted):
+        def run(self, scenario: Scenario) -> Result:
+            result = super().run(scenario)
+            moved = dict(result.record)
+            moved["theta_A"] = moved["theta_A"] + 1e-4 * moved["time"]
+            return result if len(self.steps) != 2 else result._replace(record=moved)
+
+    again = Restless()
+    assert coarse.warnings(ran("classic-ellipse", LONG), again.run) == []
+    assert again.steps == [1750, 3500, 12_000]
+
+
+def test_motion_repeats_itself_from_its_second_period_on() -> None:
+    result = ran("classic-ellipse", "duration=2.0")
+    scenario = result.scenario
+    assert repeats(scenario, result.record)
+
+    torque = result.record["torque_E"]
+    for row, value, same in ((749, 2.0, True), (1500, 2e-6, False), (1999, np.nan, False)):
+        moved = torque.copy()
+        moved[row] += value * np.abs(torque).max()
+        assert repeats(scenario, {**result.record, "torque_E": moved}) is same
+
+    # Too short, without a period, or of one that is no whole number of steps.
+    step = "path={kind='step',start=[0.0,-0.07],stop=[0.0,-0.08],lift=0.0,seconds=0.5}"
+    for setting in ("duration=1.7", step):
+        other = ran("classic-ellipse", setting)
+        assert not repeats(other.scenario, other.record)
+    uneven = ran("classic-ellipse", "duration=2.0", "path.frequency=2.001")
+    assert not repeats(uneven.scenario, uneven.record)
 
 
 def test_shortened_experiment_has_something_to_measure() -> None:

@@ -20,7 +20,7 @@ from fivebar_sim.metrics.columns import MOTORS, motors
 from fivebar_sim.metrics.limits import look_up
 from fivebar_sim.runs.extrapolation import converge
 from fivebar_sim.scenario import Scenario
-from fivebar_sim.scenario.refined import refined, shortened
+from fivebar_sim.scenario.refined import brief, refined, repeats, shortened
 from fivebar_sim.scenario.run import JudgedRun
 from fivebar_sim.scenario.scenes import Ground
 
@@ -84,7 +84,28 @@ def warnings(result: JudgedRun, again: Callable[[Scenario], JudgedRun]) -> list[
         return []
 
     scenario = result.scenario
-    begun = shortened(scenario, LONGEST)
+    longest = shortened(scenario, LONGEST)
+    begun = brief(scenario)
+    # The brief one is run anew as it is, too: it must save half of the steps at least.
+    if 3 * begun.steps < longest.steps and repeats(scenario, result.record):
+        owed = _owed(result, again, begun, repeating=True)
+        if owed is not None:
+            return owed
+    return _owed(result, again, longest) or []
+
+
+def _owed(
+    result: JudgedRun,
+    again: Callable[[Scenario], JudgedRun],
+    begun: Scenario,
+    *,
+    repeating: bool = False,
+) -> list[str] | None:
+    """Return what `warnings` does, of the beginning of a run.
+
+    It is None where the run repeats itself, and in shorter steps does not: then more is needed.
+    """
+    scenario = result.scenario
     first = result if begun is scenario else again(begun)
     said = "" if begun is scenario else f", in the first {begun.duration:g} s,"
     tables = [first.metrics]
@@ -98,6 +119,8 @@ def warnings(result: JudgedRun, again: Callable[[Scenario], JudgedRun]) -> list[
         fails = [*guards.tripped(finer.measured.guards), *_flipped(first, finer)]
         if fails:
             return [f"the timestep is too long: {when} the run fails: {'; '.join(fails)}"]
+        if repeating and not repeats(finer.scenario, finer.record):
+            return None
 
         tables.append(finer.metrics)
         found = differences(scenario, tables)

@@ -5,11 +5,19 @@ from __future__ import annotations
 import math
 
 import msgspec
+import numpy as np
 
 from fivebar_sim.errors import ConfigError
 from fivebar_sim.integrator import Integrator
+from fivebar_sim.metrics.columns import GROUND_COLUMNS, JOINT_COLUMNS, TORQUE_COLUMNS, Record
 from fivebar_sim.scenario.scenario import Scenario
 from fivebar_sim.scenario.together import MOST_STEPS
+
+SAME = 1e-6
+"""Part of a column's largest value by which one period may differ from another that it repeats."""
+
+PERIODS = 3
+"""Periods that tell of all others: the first, which has the start in it, and two that are alike."""
 
 
 def refined(scenario: Scenario, parts: int, integrator: Integrator) -> Scenario:
@@ -70,3 +78,40 @@ def shortened(scenario: Scenario, steps: int) -> Scenario:
     if duration >= scenario.duration:
         return scenario
     return msgspec.structs.replace(scenario, duration=duration)
+
+
+def brief(scenario: Scenario) -> Scenario:
+    """Return the beginning of an experiment, as far as it tells of one that `repeats` itself.
+
+    One without a period is returned itself.
+    """
+    path = scenario.path
+    if path.period is None:
+        return scenario
+    return shortened(scenario, round((path.ramp + PERIODS * path.period) / scenario.sim.timestep))
+
+
+def repeats(scenario: Scenario, record: Record) -> bool:
+    """Return whether all of a run repeats its second period after the ramp.
+
+    Then it has forgotten how it began, and what comes later is the same again.
+
+    Args:
+        scenario: The run's.
+        record: Its columns; joints, torques and the ground's force are looked at.
+    """
+    if scenario.path.period is None:
+        return False
+    steps = scenario.path.period / scenario.sim.timestep
+    period = round(steps)
+    begin = round(scenario.path.ramp / scenario.sim.timestep) + period
+    if not math.isclose(steps, period) or scenario.steps < begin + 2 * period:
+        return False
+
+    columns = (*JOINT_COLUMNS, *TORQUE_COLUMNS, *GROUND_COLUMNS)
+    for column in (record[name] for name in columns if name in record):
+        later = column[begin:]
+        moved = np.abs(later - np.resize(later[:period], later.shape))
+        if not moved.max() <= SAME * np.abs(column).max():
+            return False
+    return True
