@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from functools import cache
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -54,15 +55,8 @@ def leg_view(stage: Room, looks: Sequence[Look], follow: str | None = None) -> r
 
     centre = in_space(0.5 * (stage.low + stage.high))
     distance = 1.4 * float(np.max(stage.high - stage.low)) + 0.1 * stage.size
-    # Each band of the trail shows its own stretch of time before the cursor.
     trails: dict[EntityPathLike, VisualizerLike | Iterable[VisualizerLike]] = {
-        f"/{look.root}{band.entity}": rrb.VisibleTimeRanges(
-            timeline="sim_time",
-            start=rrb.TimeRangeBoundary.cursor_relative(nanos=_ago(band.oldest)),
-            end=rrb.TimeRangeBoundary.cursor_relative(nanos=_ago(band.newest)),
-        )
-        for look in looks
-        for band in TRAIL
+        f"/{look.root}{entity}": ages for look in looks for entity, ages in _trail().items()
     }
 
     return rrb.Spatial3DView(
@@ -77,6 +71,24 @@ def leg_view(stage: Room, looks: Sequence[Look], follow: str | None = None) -> r
         line_grid=False,
         overrides=trails,
     )
+
+
+@cache
+def _trail() -> dict[str, rrb.VisibleTimeRanges]:
+    """Return the stretch of time before the cursor that each band of the trail shows.
+
+    Made once: for Rerun they are slow to make, and they are the same in all recordings.
+    """
+    import rerun.blueprint as rrb
+
+    return {
+        band.entity: rrb.VisibleTimeRanges(
+            timeline="sim_time",
+            start=rrb.TimeRangeBoundary.cursor_relative(nanos=_ago(band.oldest)),
+            end=rrb.TimeRangeBoundary.cursor_relative(nanos=_ago(band.newest)),
+        )
+        for band in TRAIL
+    }
 
 
 def _ago(age: float) -> int:

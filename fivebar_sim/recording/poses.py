@@ -65,8 +65,10 @@ def timestep(time: Array) -> float:
 def drawn_rows(time: Array) -> Rows:
     """Return the rows whose poses are drawn: the first, one every `POSE_PERIOD`, and the last."""
     every = max(1, round(POSE_PERIOD / timestep(time)))
+    rows = np.arange(0, len(time), every)
+    last = len(time) - 1
     # The last row too, so that a replay stops where the run ended.
-    return np.union1d(np.arange(0, len(time), every), len(time) - 1)
+    return rows if rows[-1] == last else np.append(rows, last)
 
 
 def points(record: Mapping[str, Array], name: str) -> Array:
