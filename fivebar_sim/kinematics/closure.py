@@ -25,7 +25,7 @@ from fivebar_sim.kinematics.planar import (
     unit,
 )
 
-ROUNDING = 16 * np.finfo(float).eps
+ROUNDING = float(16 * np.finfo(float).eps)
 """Slack of a squared distance d^2 at the edge of reach, relative to d times the coordinates of the
 two points: just their rounding."""
 
