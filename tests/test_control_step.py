@@ -89,17 +89,23 @@ def test_resolution_is_the_nearest_step(theta: float, resolution: float) -> None
 
 
 def test_noise_has_its_size_and_is_white() -> None:
+    """20,000 numbers of each kind: of 100 legs, so that few steps are taken."""
     sensors = Sensors(noise=0.01, rate_noise=3.0)
-    still = np.zeros((1, 20_001, 2))
-    control = step(sensors=sensors, steps=20_000, start=still[:, 0])
+    still = np.zeros((100, 201, 2))
+    control = step(sensors=sensors, steps=200, start=still[:, 0], seeds=tuple(range(100)))
     angles, rates = observed(control, still, still, 1)
     for values, size in ((angles, 0.01), (rates, 3.0)):
-        assert np.abs(values.mean(axis=1)).max() < 4.0 * size / np.sqrt(20_000)
-        np.testing.assert_allclose(values.std(axis=1), size, rtol=4.0 / np.sqrt(40_000))
-        A, E = values[0].T
-        assert abs(np.corrcoef(A[:-1], A[1:])[0, 1]) < 0.03
-        assert abs(np.corrcoef(A, E)[0, 1]) < 0.03
-    assert abs(np.corrcoef(angles[0, :, 0], rates[0, :, 0])[0, 1]) < 0.03
+        assert np.abs(values.mean(axis=(0, 1))).max() < 4.0 * size / np.sqrt(20_000)
+        np.testing.assert_allclose(values.std(axis=(0, 1)), size, rtol=4.0 / np.sqrt(40_000))
+        A, E = np.moveaxis(values, -1, 0)
+        assert abs(correlation(A[:, :-1], A[:, 1:])) < 0.03
+        assert abs(correlation(A[:-1], A[1:])) < 0.03
+        assert abs(correlation(A, E)) < 0.03
+    assert abs(correlation(angles[..., 0], rates[..., 0])) < 0.03
+
+
+def correlation(one: Array, other: Array) -> float:
+    return float(np.corrcoef(one.ravel(), other.ravel())[0, 1])
 
 
 @pytest.mark.parametrize("seeds", [(5,), (5, 7, 9), (9, 7, 5), (5, 5), tuple(range(20))])

@@ -108,8 +108,9 @@ def feedback(result: Result) -> Guard | None:
 
 
 def test_a_shorter_step_shows_what_the_guard_says() -> None:
+    settings = [UNDAMPED, "sim.timestep=0.0005", "duration=1.25"]
     with pytest.raises(DivergedError, match=r"the foot left its path at t = 1\.0"):
-        rollout.run(Scenario.load("classic-ellipse", [UNDAMPED, "sim.timestep=0.0005"]))
+        rollout.run(Scenario.load("classic-ellipse", settings))
 
 
 @pytest.mark.parametrize(
