@@ -74,6 +74,13 @@ def test_what_acts_or_is_recorded_is_kept(scene: str, servo: Servo, kept: set[An
     assert {flag for flag in chosen if not flags & flag.value} == kept
 
 
+@pytest.mark.parametrize("scene", ["air", "payload", "rail", "treadmill"])
+def test_time_angles_and_rates_are_all_of_the_state(scene: str) -> None:
+    built = model.build(CLASSIC, scene=scene, servo=Servo())
+    whole = mujoco.mj_stateSize(built, mujoco.mjtState.mjSTATE_FULLPHYSICS)
+    assert mujoco.mj_stateSize(built, STATE) == whole == 1 + built.nq + built.nv
+
+
 def test_motion_alone_has_the_same_bits_without_the_grounds_force() -> None:
     built = model.build(CLASSIC, scene=Rail(mass=0.5, drop=0.01, friction=1.0))
     assert lean.left_out(built, forces=False) & OFF.mjDSBL_SENSOR.value

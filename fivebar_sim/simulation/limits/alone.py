@@ -20,7 +20,7 @@ from fivebar_sim.simulation.limits.clipping import MOST_MODES, Clipping, settle
 from fivebar_sim.simulation.limits.limited import ITERATIONS, STATE, UNSOLVED
 from fivebar_sim.simulation.limits.servos import Servos
 
-KEPT = STATE.value | mujoco.mjtState.mjSTATE_WARMSTART.value
+KEPT = STATE | mujoco.mjtState.mjSTATE_WARMSTART.value
 """What a step begins with: as STATE, and behind it where the solver starts."""
 
 WHOLE = mujoco.mjtState.mjSTATE_INTEGRATION

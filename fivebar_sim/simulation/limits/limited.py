@@ -22,8 +22,12 @@ from fivebar_sim.simulation.limits.clipping import (
 INPUTS = mujoco.mjtState.mjSTATE_CTRL | mujoco.mjtState.mjSTATE_QFRC_APPLIED
 """What every step is given: commands, then forces on the joints."""
 
-STATE = mujoco.mjtState.mjSTATE_FULLPHYSICS
-"""Time, qpos and qvel: the models have no other state."""
+STATE = (
+    mujoco.mjtState.mjSTATE_TIME.value
+    | mujoco.mjtState.mjSTATE_QPOS.value
+    | mujoco.mjtState.mjSTATE_QVEL.value
+)
+"""All that the models' state is; for more kinds, of which there is none, every step looks too."""
 
 WARMSTART = "qacc_warmstart"
 """Where the solver starts: with it and the state a step that is taken again has the same bits."""
