@@ -119,6 +119,10 @@ def _seldom_collected() -> Iterator[None]:
     try:
         yield
     finally:
+        # All that is new would be gone through at once; so it counts as old.
+        if not gc.get_freeze_count():
+            gc.freeze()
+            gc.unfreeze()
         gc.set_threshold(*before)
         # At the end of the process too, which has no need of the memory any more.
         atexit.unregister(gc.freeze)
