@@ -21,7 +21,15 @@ def installed(group: str, what: str) -> dict[str, EntryPoint]:
     Raises:
         ConfigError: If two packages bring one of the same name.
     """
-    return dict(_read(group, what, tuple(_stamp(path) for path in sys.path)))
+    found: dict[str, EntryPoint] = {}
+    for entry in _read(tuple(_stamp(path) for path in sys.path)).select(group=group):
+        if entry.name in found and found[entry.name].value != entry.value:
+            raise ConfigError(
+                f"two {what}s are called {entry.name!r}: {found[entry.name].value} and "
+                f"{entry.value}; uninstall one"
+            )
+        found[entry.name] = entry
+    return found
 
 
 def load(entry: EntryPoint, what: str) -> Any:
@@ -49,15 +57,10 @@ def _stamp(path: str) -> tuple[str, int]:
 # Reading the metadata of every installed package takes longer than many a run, so it is read again
 # only after one of the folders has changed.
 @cache
-def _read(group: str, what: str, stamps: tuple[tuple[str, int], ...]) -> dict[str, EntryPoint]:
-    """Return what `installed` does, for folders in one state."""
+def _read(stamps: tuple[tuple[str, int], ...]) -> Any:
+    """Return the entry points of all groups, for folders in one state: something to `select` from.
+
+    Python 3.12 has `EntryPoints` for that, Python 3.11 a class of its own.
+    """
     del stamps  # what the cache goes by
-    found: dict[str, EntryPoint] = {}
-    for entry in entry_points(group=group):
-        if entry.name in found and found[entry.name].value != entry.value:
-            raise ConfigError(
-                f"two {what}s are called {entry.name!r}: {found[entry.name].value} and "
-                f"{entry.value}; uninstall one"
-            )
-        found[entry.name] = entry
-    return found
+    return entry_points()
