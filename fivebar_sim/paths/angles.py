@@ -3,21 +3,22 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any, Literal, Self
+from typing import TYPE_CHECKING, Any, Literal, Self
 
 import msgspec
 from numpy.typing import ArrayLike
 
-from fivebar_sim import logs
 from fivebar_sim.arrays import Array
 from fivebar_sim.errors import ArgumentError, ConfigError
 from fivebar_sim.geometry import FiveBar
 from fivebar_sim.kinematics.foot_motion import foot_motion
 from fivebar_sim.kinematics.logged import check_closes
-from fivebar_sim.logs import channels
 from fivebar_sim.paths.base import FootPath, Sample
 from fivebar_sim.paths.spline import Spline
 from fivebar_sim.paths.track import read_bytes
+
+if TYPE_CHECKING:
+    from fivebar_sim.logs import Log
 
 WHAT = "table of angles"
 
@@ -44,7 +45,7 @@ class Angles(FootPath, frozen=True, tag="angles", dict=True):
     interpolation: Literal["cubic", "linear", "hold"] = "cubic"
 
     @classmethod
-    def of_log(cls, log: logs.Log) -> Self:
+    def of_log(cls, log: Log) -> Self:
         """Return the path of a log that was read, without a ramp."""
         path = cls(file=log.where, ramp=0.0)
         vars(path)["log"] = log
@@ -65,8 +66,12 @@ class Angles(FootPath, frozen=True, tag="angles", dict=True):
         return kept["content"]
 
     @property
-    def log(self) -> logs.Log:
+    def log(self) -> Log:
         """The angles, as `logs.read` reads them, without the rows in which one is missing."""
+        # The reader is as large as all paths, few of which are read by it.
+        from fivebar_sim import logs
+        from fivebar_sim.logs import channels
+
         kept = vars(self)
         if "log" not in kept:
             table = dict.fromkeys(("time", *NEEDED))

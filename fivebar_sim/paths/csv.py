@@ -17,7 +17,6 @@ from numpy.typing import ArrayLike
 
 from fivebar_sim.arrays import Array
 from fivebar_sim.errors import ArgumentError, ConfigError, unknown
-from fivebar_sim.logs import channels
 from fivebar_sim.paths.base import TIME_ROUNDING, FootPath, Sample, check_number
 from fivebar_sim.paths.spline import Spline
 from fivebar_sim.paths.track import TimedPairs, read_bytes, read_mapped, read_track
@@ -141,6 +140,8 @@ class Csv(FootPath, frozen=True, tag="csv", dict=True):
         """Return the file's points."""
         if self.columns is None:
             return read_track(self.content, HEADERS, WHAT, Path(self.file))
+        from fivebar_sim.logs import channels
+
         return read_mapped(self.content, self.columns, channels.PATH, self.file)
 
     @cached_property

@@ -5,15 +5,16 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from fivebar_sim import logs
 from fivebar_sim.arrays import Array
 from fivebar_sim.errors import ConfigError, unknown
 from fivebar_sim.files import input_file
-from fivebar_sim.logs.channels import Channels
+
+if TYPE_CHECKING:
+    from fivebar_sim.logs.channels import Channels
 
 Headers = Mapping[tuple[str, str, str], float]
 
@@ -124,6 +125,9 @@ def read_mapped(raw: bytes, table: Mapping[str, Any], known: Channels, where: st
     Raises:
         ConfigError: What `logs.read` raises.
     """
+    # As in `angles`.
+    from fivebar_sim import logs
+
     told = logs.read_map(dict(table), f"{where}: columns", known=known)
     log = logs.read(raw, told, known, ("x", "z"), where)
     time, pair = log.complete("x", "z")

@@ -17,7 +17,6 @@ from numpy.typing import ArrayLike
 from fivebar_sim import paths
 from fivebar_sim.arrays import Array
 from fivebar_sim.errors import ArgumentError
-from fivebar_sim.logs import channels
 from fivebar_sim.paths import FootPath, Gait
 from fivebar_sim.paths.base import Pair, check_pair, times
 from fivebar_sim.paths.track import TimedPairs, read_bytes, read_mapped, read_track
@@ -184,6 +183,8 @@ class Csv(FootForce, frozen=True, tag="csv", dict=True):
     def _track(self) -> TimedPairs:
         if self.columns is None:
             return read_track(self.content, HEADERS, WHAT, Path(self.file))
+        from fivebar_sim.logs import channels
+
         return read_mapped(self.content, self.columns, channels.FORCE, self.file)
 
 
