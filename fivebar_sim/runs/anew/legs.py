@@ -107,7 +107,8 @@ def of_columns(
 def _needed(model: mujoco.MjModel, q: Array, v: Array, h: float) -> Array:
     """Return M(q) (v' - v) / h + c(q, v) of each step, gravity included, (N, nv)."""
     data = mujoco.MjData(model)
-    acceleration = np.diff(v, axis=0) / h
+    # MuJoCo takes rows that lie in one piece of memory.
+    acceleration = np.ascontiguousarray(np.diff(v, axis=0)) / h
     found = np.empty_like(acceleration)
     bias = np.empty(model.nv)
     for k, wanted in enumerate(acceleration):
