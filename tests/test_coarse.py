@@ -240,6 +240,31 @@ def test_brief_run_warns_as_the_whole_one_does(monkeypatch: pytest.MonkeyPatch) 
     assert brief.endswith(why)
 
 
+def test_ramp_that_is_no_whole_number_of_steps_costs_nothing_more() -> None:
+    again = Counted()
+    assert coarse.warnings(ran("classic-ellipse", LONG, "path.ramp=0.2503"), again.run) == []
+    assert again.steps == [1751, 3502]
+
+
+@pytest.mark.parametrize(
+    "key", ["tracking.rms", "load.torque_rms.A", "load.opposing.energy", "energy.constraints"]
+)
+def test_limit_that_breaks_in_shorter_steps_is_judged_by_all_of_the_run(key: str) -> None:
+    """The first period is a third of the brief run, and a sum grows with every period."""
+    settings = (LONG, "path.ramp=0.05")
+    result = ran("classic-ellipse", *settings)
+    finer = ran("classic-ellipse", *settings, "sim.timestep=0.0005")
+    values = [look_up(each.metrics, key) for each in (result, finer)]
+    was, now = (value for value in values if value is not None)
+    middle = 0.5 * (was + now)
+    limit = f"[{middle}, 1e3]" if now < was else f"[-1e3, {middle}]"
+    limited = rollout.run(
+        Scenario.load("classic-ellipse", [*settings, f"limits={{{key}={limit}}}"])
+    )
+    assert limited.verdict == "pass"
+    assert "breaks its limit" in " ".join(coarse.warnings(limited, rollout.run))
+
+
 def test_run_that_repeats_itself_only_in_its_own_steps_is_taken_again_whole() -> None:
     class Restless(Counted):
         def run(self, scenario: Scenario) -> Result:

@@ -69,6 +69,9 @@ OPENED = 0.5
 SPRUNG = 0.15
 """The same of what `discrete` adds to the servos' damping, as a part of it."""
 
+ALIKE = 0.01
+"""Part of its limit by which a metric of a run's beginning may differ from that of all of it."""
+
 FIRST = 10
 """Steps in which a run starts: what is held, and perhaps moves, sets in at once."""
 
@@ -103,7 +106,7 @@ def _owed(
 ) -> list[str] | None:
     """Return what `warnings` does, of the beginning of a run.
 
-    It is None where the run repeats itself, and in shorter steps does not: then more is needed.
+    It is None where the run repeats itself, and yet its beginning does not tell of all of it.
     """
     scenario = result.scenario
     first = result if begun is scenario else again(begun)
@@ -116,11 +119,12 @@ def _owed(
         except FiveBarError as error:
             return [f"the timestep is too long: {when} the run ends: {error}"]
 
-        fails = [*guards.tripped(finer.measured.guards), *_flipped(first, finer)]
+        tripped = guards.tripped(finer.measured.guards)
+        if repeating and not tripped and not _tells(result, first, finer):
+            return None
+        fails = [*tripped, *_flipped(first, finer)]
         if fails:
             return [f"the timestep is too long: {when} the run fails: {'; '.join(fails)}"]
-        if repeating and not repeats(finer.scenario, finer.record):
-            return None
 
         tables.append(finer.metrics)
         found = differences(scenario, tables)
@@ -134,6 +138,32 @@ def _owed(
         if not any(each.doubtful for each in found):
             return []
     return []
+
+
+def _tells(result: JudgedRun, first: JudgedRun, finer: JudgedRun) -> bool:
+    """Return whether the beginning of a run that repeats itself tells of all its limits.
+
+    It does where it repeats itself in shorter steps too, no metric with a limit adds up over the
+    run, and none is so near to its limit that the first period's part in it would decide.
+
+    Args:
+        result: The run.
+        first: Its beginning.
+        finer: The same in shorter steps.
+    """
+    if not repeats(finer.scenario, finer.record):
+        return False
+    for whole, was, now in zip(result.limits, first.limits, finer.limits, strict=True):
+        if whole.value is None or was.value is None or now.value is None:
+            return False
+        # Twice what shorter steps do.
+        moved = whole.value + 2.0 * (now.value - was.value)
+        if not whole.low <= moved <= whole.high:
+            return False
+        bounds = [bound for bound in (whole.low, whole.high) if np.isfinite(bound)]
+        if any(abs(was.value - whole.value) > ALIKE * abs(bound) for bound in bounds):
+            return False
+    return True
 
 
 class Difference(NamedTuple):

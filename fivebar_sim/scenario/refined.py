@@ -88,7 +88,9 @@ def brief(scenario: Scenario) -> Scenario:
     path = scenario.path
     if path.period is None:
         return scenario
-    return shortened(scenario, round((path.ramp + PERIODS * path.period) / scenario.sim.timestep))
+    steps = (path.ramp + PERIODS * path.period) / scenario.sim.timestep
+    # Up to the next whole step, but not because of rounding.
+    return shortened(scenario, math.ceil(steps * (1.0 - 1e-9)))
 
 
 def repeats(scenario: Scenario, record: Record) -> bool:
