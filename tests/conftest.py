@@ -98,8 +98,8 @@ def pytest_runtest_protocol(item: pytest.Item, nextitem: pytest.Item | None) -> 
     workers and who started them as long as a short test does. Whoever asks for every duration, or
     for JUnit's file, gets all of them.
     """
-    asked = item.config.getoption("durations") or item.config.getoption("xmlpath")
-    if asked or "PYTEST_XDIST_WORKER" not in os.environ:
+    timed = item.config.getoption("durations") is not None
+    if timed or item.config.getoption("xmlpath") or "PYTEST_XDIST_WORKER" not in os.environ:
         return None
 
     for report in runtestprotocol(item, log=False, nextitem=nextitem):
