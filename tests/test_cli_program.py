@@ -7,7 +7,6 @@ import os
 import re
 import subprocess
 import sys
-import weakref
 from pathlib import Path
 
 import pytest
@@ -21,13 +20,6 @@ DIVERGING = ["--set", "sim.integrator=implicitfast", "--set", "sim.timestep=0.02
 
 
 FIVEBAR = str(Path(sys.executable).with_name("fivebar"))
-
-
-class Cycle:
-    """What only the garbage collector frees."""
-
-    def __init__(self) -> None:
-        self.own = self
 
 
 @pytest.fixture
@@ -104,22 +96,12 @@ def test_a_closed_stdout_or_stderr_changes_no_status(
 def test_start_and_end_are_quick() -> None:
     code = """
 import atexit, gc, sys
-from fivebar_sim.cli import main, program
+from fivebar_sim.cli import main
 frozen = gc.get_freeze_count()  # Python 3.12 begins with some
 atexit.register(lambda: print("frozen:", gc.get_freeze_count() > frozen))
 slow = {"rerun", "dm_control", "matplotlib", "mujoco", "scipy", "pyarrow", "typeguard", "asyncio"}
 main(["--help"])
 print("slow:", sorted({"tyro", "rich", *slow} & set(sys.modules)))
-program._keep_imports.cache_clear()  # as if what follows were the first call
-collected = []
-gc.set_threshold(200)
-gc.collect()
-gc.callbacks.append(lambda phase, info: collected.append(len(gc.get_objects(0))))
-main(["list", "legs"])
-some = [{number} for number in range(99)]
-# From Python 3.12 on it looks once at what the call itself made.
-print("slow:", [young for young in collected if young > 20_000])
-gc.callbacks.clear()
 for args in (["--version"], ["-h"], ["run", "--help"], ["report", "--help"]):
     try:
         main(args)
@@ -130,8 +112,8 @@ print("frozen:", gc.get_freeze_count() > frozen)
 """
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     said = [line for line in done.stdout.splitlines() if line.startswith(("slow:", "frozen:"))]
-    # What was imported is left alone when a call ends, and frozen only at the end of the process.
-    assert said == [*6 * ["slow: []"], "frozen: False", "frozen: True"]
+    # What was imported is left alone at the end of the process, and only there.
+    assert said == [*5 * ["slow: []"], "frozen: False", "frozen: True"]
 
 
 def test_tables_do_without_pandas_unless_something_needs_it(tmp_path: Path) -> None:
@@ -176,18 +158,6 @@ def test_the_collector_is_seldom_called_within(monkeypatch: pytest.MonkeyPatch) 
         gc.set_threshold(*usual)
     assert during == [fivebar.SELDOM, 0, 900_000]
     assert fivebar.SELDOM > 100 * 700
-
-
-def test_garbage_of_later_calls_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
-    """In a process that calls the program again and again, as a notebook may."""
-    fivebar._keep_imports()
-    # The process of the tests has frozen what it imported.
-    monkeypatch.setattr(gc, "get_freeze_count", lambda: 0)
-    alive: weakref.WeakSet[Cycle] = weakref.WeakSet()
-    with fivebar._seldom_collected():
-        alive.update(Cycle() for _ in range(60))
-    gc.collect(0)
-    assert not alive
 
 
 def test_help_is_a_line_a_command(shell: Shell) -> None:

@@ -119,23 +119,10 @@ def _seldom_collected() -> Iterator[None]:
     try:
         yield
     finally:
-        _keep_imports()
         gc.set_threshold(*before)
         # At the end of the process too, which has no need of the memory any more.
         atexit.unregister(gc.freeze)
         atexit.register(gc.freeze)
-
-
-@functools.cache
-def _keep_imports() -> None:
-    """Count all that there is as old: else the collector would go through it at once.
-
-    Only at the end of a process's first call, when that is mostly what was imported: it would never
-    come to know the garbage of later ones.
-    """
-    if not gc.get_freeze_count():
-        gc.freeze()
-        gc.unfreeze()
 
 
 def user_environment() -> dict[str, str]:

@@ -35,7 +35,7 @@ class RobotPlan(NamedTuple):
         legs: The plan of each leg, in the order of `LEGS`, as if it were alone in the air; each has
             the robot's model.
         model: The compiled MuJoCo model.
-        start: qpos at t = 0: level, at rest, the lowest foot `CLEAR` of the floor.
+        start: qpos at t = 0: level, at rest, the lowest foot `CLEAR` above the floor.
         setpoints: What reaches the motors in every step [rad], (N, 8); None where a feedback
             controller decides during the run.
         pushes: Forces on the trunk in every step [N], (N, 3) for each push.
